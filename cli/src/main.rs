@@ -1,0 +1,2 @@
+//! The `feedspline` command.
+fn main() {}

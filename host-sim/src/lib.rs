@@ -1,0 +1,1 @@
+//! Simulated drives, servos, plants and bus around the shipped firmware core.

@@ -1,0 +1,1 @@
+//! Proves a rounded feed table against its limits at every instant, with Bernstein coefficients.

@@ -1,0 +1,147 @@
+//! The machine: its axes, their limits, their drives.
+
+/// Most axes one job can move.
+pub const MAX_AXES: usize = 9;
+
+/// A position or direction in axis space, in axis units; entries beyond the machine's axes are zero.
+pub type Point = [f64; MAX_AXES];
+
+/// A machine, as its machine file describes it, checked and with every default filled in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machine {
+    /// Name shown in reports.
+    pub name: String,
+    /// Period of the drives' control loop [s].
+    pub control_tick_s: f64,
+    /// Path tolerance when the program says nothing [mm].
+    pub tolerance_mm: f64,
+    /// Path tolerance of the rotary axes [axis unit].
+    pub tolerance_rotary: f64,
+    /// Joints of blocks when the program says nothing.
+    pub corner: CornerMode,
+    /// The axes, in the order of the file; at most [`MAX_AXES`].
+    pub axes: Vec<Axis>,
+    /// Stored position of G28, in machine coordinates.
+    pub home: Point,
+    /// Stored position of G30, in machine coordinates.
+    pub second_home: Point,
+    /// Tool lengths by tool number, for G43 H [mm].
+    pub tools: Vec<Tool>,
+}
+
+/// One row of the tool table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tool {
+    /// Tool number.
+    pub number: u32,
+    /// Length offset along Z [mm].
+    pub length_mm: f64,
+}
+
+/// What happens where two blocks meet when the program does not say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CornerMode {
+    /// As G64 P with the machine's tolerance.
+    Blend,
+    /// As G61.
+    ExactPath,
+    /// As G61.1.
+    ExactStop,
+}
+
+/// One axis with its drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// Upper-case letter or name.
+    pub name: String,
+    /// Slide or turntable.
+    pub kind: AxisKind,
+    /// Unit of every length of this axis.
+    pub unit: Unit,
+    /// Drive counts per axis unit.
+    pub counts_per_unit: f64,
+    /// Lowest and highest machine position [axis unit].
+    pub travel: [f64; 2],
+    /// Limits of feed moves.
+    pub limits: AxisLimits,
+    /// Limits of rapid moves.
+    pub rapid: AxisLimits,
+    /// The mechanics behind the drive.
+    pub plant: Plant,
+    /// The drive's controller.
+    pub servo: Servo,
+}
+
+/// How an axis moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AxisKind {
+    /// A slide; positions in millimetres.
+    Linear,
+    /// A turntable or a swivel; positions in degrees or radians.
+    Rotary,
+}
+
+/// Unit of an axis position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// Millimetre.
+    Mm,
+    /// Degree.
+    Deg,
+    /// Radian.
+    Rad,
+}
+
+/// Velocity, acceleration and jerk bounds of one axis, symmetric, per second^n in the axis unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisLimits {
+    /// Largest |velocity|.
+    pub velocity: f64,
+    /// Largest |acceleration|.
+    pub acceleration: f64,
+    /// Largest |jerk|; infinite when jerk is not limited.
+    pub jerk: f64,
+}
+
+/// The mechanics of one axis, in generalised SI units: kg, N, m on slides; kg m^2, N m, rad on rotary axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plant {
+    /// Moving mass [kg] or inertia [kg m^2], motor and load together.
+    pub inertia: f64,
+    /// Viscous friction [N s/m] or [N m s/rad].
+    pub viscous: f64,
+    /// Coulomb friction [N] or [N m].
+    pub coulomb: f64,
+    /// Largest motor force [N] or torque [N m].
+    pub effort_limit: f64,
+    /// Encoder counts per drive count (resolution of the measured position relative to the commanded one).
+    pub encoder_counts_per_count: f64,
+    /// Second mass behind an elastic coupling, if any.
+    pub two_mass: Option<TwoMass>,
+}
+
+/// A load behind an elastic coupling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TwoMass {
+    /// Share of the inertia on the load side, in (0, 1).
+    pub load_share: f64,
+    /// Natural frequency of the coupling with both masses free [Hz].
+    pub frequency_hz: f64,
+    /// Damping ratio of the coupling.
+    pub damping: f64,
+}
+
+/// A cascaded P-PI controller with velocity and acceleration feed-forward.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Servo {
+    /// Position loop gain [1/s].
+    pub position_gain: f64,
+    /// Velocity loop bandwidth [rad/s]; the proportional gain is this times the inertia.
+    pub velocity_bandwidth: f64,
+    /// Integral time of the velocity loop [s].
+    pub integral_time_s: f64,
+    /// Share of the set-point velocity fed forward, 0 to 1.
+    pub velocity_feed_forward: f64,
+    /// Share of the set-point acceleration fed forward, 0 to 1.
+    pub acceleration_feed_forward: f64,
+}

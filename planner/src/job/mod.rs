@@ -1,0 +1,4 @@
+//! What a user hands in: machine files and part programs.
+
+pub mod machine;
+pub mod program;

@@ -1,0 +1,1 @@
+//! One job from file to certified feed tables.

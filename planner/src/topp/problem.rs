@@ -1,0 +1,67 @@
+//! The feed problem and its answer; solvers stand behind these types.
+
+use crate::feed::table::FeedTable;
+use crate::geometry::grid_path::GridPath;
+use crate::geometry::section::FeedCap;
+use crate::job::machine::AxisLimits;
+
+/// Find the fastest motion from rest to rest along a rounded path.
+#[derive(Clone, Copy, Debug)]
+pub struct Problem<'a> {
+    /// The rounded path.
+    pub path: &'a GridPath,
+    /// One per axis of the path.
+    pub limits: &'a [AxisLimits],
+    /// Caps on the path speed, consecutive, the last one ending with the path.
+    pub caps: &'a [FeedCap],
+    /// Shortest time a span may take: one control tick [s].
+    pub shortest_span_s: f64,
+}
+
+/// How to solve it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Which solver.
+    pub solver: Solver,
+    /// Stop when the remaining gap is below this share of the time.
+    pub relative_gap: f64,
+    /// q spans per A/J of motion time.
+    pub spans_per_ramp: f64,
+}
+
+/// The solvers behind the one problem type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Solver {
+    /// The feasible-start interior-point method of this crate: minimum time under true jerk in one run.
+    InteriorPoint,
+    /// Clarabel on a sequence of linear programmes with the same rows.
+    Clarabel,
+}
+
+/// A motion along the path, rounded.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// What the drives will play.
+    pub table: FeedTable,
+    /// Which limit holds each q span down, one per span.
+    pub binding: Vec<Binding>,
+    /// Iterations of the solver, all windows together.
+    pub iterations: u64,
+}
+
+/// The limit that rules a span.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Binding {
+    /// Velocity of this axis.
+    Velocity(u8),
+    /// Acceleration of this axis.
+    Acceleration(u8),
+    /// Jerk of this axis.
+    Jerk(u8),
+    /// The programmed feed.
+    Feed,
+    /// The rest at an end of the table.
+    Rest,
+    /// None within a thousandth.
+    Free,
+}

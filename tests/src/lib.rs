@@ -1,0 +1,1 @@
+//! Oracles, generators and shared pieces of the whole-product suites.

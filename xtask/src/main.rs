@@ -1,0 +1,2 @@
+//! One front door for building, checking and measuring.
+fn main() {}
