@@ -1,0 +1,380 @@
+//! A C2 cubic spline inside the tolerance: quasi-interpolation on knots that are split where it fails.
+//!
+//! Control point i is C(xi) - lambda (var/2) C''(xi), with xi the Greville abscissa and
+//! var = sum (t - xi)^2 / 6 over its three knots: exact for quadratics, fourth order on smooth data. Where that
+//! rings or nearly stands still, lambda = 0 (Schoenberg): control points on the contour, which never overshoots.
+//! Every decision looks a few spans around, so places far apart do not influence each other.
+//!
+//! The seam to other fitters is [`fit`]: contour and demand in, spline out.
+
+use super::certify::{Metric, SpanCurve, within};
+use super::contour::Contour;
+use super::knots::Knots;
+use crate::job::machine::{MAX_AXES, Point};
+use crate::tolerances::{SLOW_PARAMETER, STANDSTILL_PARAMETER};
+
+/// What a fit has to keep.
+#[derive(Clone, Debug)]
+pub(super) struct Demand<'a> {
+    /// How distances are measured.
+    pub metric: &'a Metric,
+    /// First grid step in u; halved as needed.
+    pub step: f64,
+    /// Longest span where the contour is not one line [u].
+    pub longest: f64,
+    /// Most an axis may move in one span [axis units].
+    pub reach: &'a Point,
+}
+
+/// A spline whose knots are on the grid; control points still in axis units.
+#[derive(Clone, Debug)]
+pub(super) struct Spline {
+    /// The knots.
+    pub knots: Knots,
+    /// Control points, `axes` numbers each.
+    pub controls: Vec<f64>,
+}
+
+/// Why there is no spline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Unfit {
+    /// The path would all but stand still at the start of this primitive: it has to stop there.
+    StopAt(usize),
+    /// It would take too many spans; index of a primitive it is about.
+    TooManySpans(usize),
+}
+
+/// Most spans of one section.
+const MOST_SPANS: usize = 1 << 24;
+
+/// Most grid steps of one section: multiples of the step stay exact.
+const MOST_STEPS: u64 = 1 << 52;
+
+/// Shift of the control point at a corner, in quasi-interpolant corrections: 0.4 h sin(theta/2) outwards.
+const SWING_WIDE: f64 = 1.2;
+
+/// Fits a spline to a contour whose length is a whole number of grid steps.
+pub(super) fn fit(contour: &Contour, demand: &Demand<'_>) -> Result<Spline, Unfit> {
+    let knots = Knots::coarse(contour, demand.step, demand.longest);
+    let mut fitter = Fitter::new(contour, demand, knots);
+    loop {
+        let mut split = vec![false; fitter.knots.spans()];
+        let plain = fitter.examine(&mut split)?;
+        fitter.knots.grade(&mut split);
+        let any = split.iter().any(|&s| s);
+        if !any && !plain {
+            return Ok(Spline { knots: fitter.knots, controls: fitter.controls });
+        }
+        if any {
+            fitter.halve(&split)?;
+        }
+    }
+}
+
+/// What to do about a span.
+enum Verdict {
+    Good,
+    Plain,
+    Split,
+}
+
+struct Fitter<'a> {
+    contour: &'a Contour,
+    demand: &'a Demand<'a>,
+    axes: usize,
+    knots: Knots,
+    /// Contour at the Greville abscissae, `axes` numbers per control point.
+    samples: Vec<f64>,
+    /// Control points, `axes` numbers each.
+    controls: Vec<f64>,
+    /// Control points with lambda = 0.
+    plain: Vec<bool>,
+    /// Spans not proven yet.
+    open: Vec<bool>,
+}
+
+impl<'a> Fitter<'a> {
+    fn new(contour: &'a Contour, demand: &'a Demand<'a>, knots: Knots) -> Self {
+        let axes = demand.metric.axes;
+        let n = knots.spans() + 3;
+        let mut f = Self {
+            contour,
+            demand,
+            axes,
+            open: vec![true; knots.spans()],
+            knots,
+            samples: vec![0.0; n * axes],
+            controls: vec![0.0; n * axes],
+            plain: vec![false; n],
+        };
+        let mut hint = 0;
+        for i in 0..n {
+            hint = f.sample(i, hint);
+        }
+        let mut hint = 0;
+        for i in 0..n {
+            hint = f.place(i, hint);
+        }
+        f
+    }
+
+    fn greville(&self, i: usize) -> f64 {
+        let [a, b, c] = self.knots.support(i);
+        (a + b + c) / 3.0
+    }
+
+    /// Samples the contour for control point `i`.
+    fn sample(&mut self, i: usize, hint: usize) -> usize {
+        let u = self.greville(i);
+        let k = self.contour.seek(hint, u);
+        let p = self.contour.position(k, u);
+        self.samples[i * self.axes..][..self.axes].copy_from_slice(&p[..self.axes]);
+        k
+    }
+
+    /// Computes control point `i` from the samples around it.
+    fn place(&mut self, i: usize, hint: usize) -> usize {
+        let n = self.axes;
+        let last = self.plain.len() - 1;
+        let at = i * n;
+        for a in 0..n {
+            self.controls[at + a] = self.samples[at + a];
+        }
+        if i == 0 || i == last || self.plain[i] {
+            return hint;
+        }
+        let knots = self.knots.support(i);
+        let u = (knots[0] + knots[1] + knots[2]) / 3.0;
+        let (ul, ur) = (self.greville(i - 1), self.greville(i + 1));
+        let spread = knots.iter().map(|t| (t - u) * (t - u)).sum::<f64>() / 12.0;
+        let k = self.contour.seek(hint, u);
+        let p = &self.contour.primitives[k];
+        let origin = self.contour.start_of(k);
+        if ul >= origin && ur <= self.contour.ends[k] {
+            if let Some(round) = &p.round {
+                // (1 + v + v^2/2 + ..) cancels the radius that a spline of points on the circle loses, to the
+                // fourth order on even knots: 3 / (2 + cos phi) with v = phi^2 / 6.
+                let v = (spread * round.angle_slope * round.angle_slope).min(1.0);
+                let (e, _) = round.at(u - origin);
+                for (e, axis) in e.into_iter().zip(round.plane) {
+                    self.controls[at + axis] += e * v * (1.0 + 0.5 * v);
+                }
+            }
+            return k;
+        }
+        let (before, after) = (at - n, at + n);
+        let lambda = if self.knots.corner[i - 1] { SWING_WIDE } else { 1.0 };
+        for a in 0..n {
+            let f = self.samples[at + a];
+            let slopes = [(f - self.samples[before + a]) / (u - ul), (self.samples[after + a] - f) / (ur - u)];
+            self.controls[at + a] -= lambda * spread * 2.0 * (slopes[1] - slopes[0]) / (ur - ul);
+        }
+        k
+    }
+
+    /// The curve of span `j` with the given control points.
+    fn curve(&self, j: usize, controls: &[f64]) -> SpanCurve {
+        let o = j as isize;
+        let t: [f64; 6] =
+            std::array::from_fn(|k| (self.knots.clamped(o - 2 + k as isize) as f64) * self.knots.step);
+        let mut b = [[0.0; MAX_AXES]; 4];
+        let weights = [
+            (t[2] - t[1]) / (t[4] - t[1]),
+            (t[3] - t[1]) / (t[4] - t[1]),
+            (t[2] - t[0]) / (t[3] - t[0]),
+            (t[2] - t[1]) / (t[3] - t[1]),
+            (t[3] - t[2]) / (t[5] - t[2]),
+            (t[3] - t[2]) / (t[4] - t[2]),
+        ];
+        let mix = |x: f64, y: f64, w: f64| x + w * (y - x);
+        for a in 0..self.axes {
+            let c: [f64; 4] = std::array::from_fn(|k| controls[(j + k) * self.axes + a]);
+            b[1][a] = mix(c[1], c[2], weights[0]);
+            b[2][a] = mix(c[1], c[2], weights[1]);
+            b[0][a] = mix(mix(c[0], c[1], weights[2]), b[1][a], weights[3]);
+            b[3][a] = mix(b[2][a], mix(c[2], c[3], weights[4]), weights[5]);
+        }
+        SpanCurve::new(t[2], t[3] - t[2], &b, self.axes)
+    }
+
+    /// Whether some axis moves further in span `j` than a span may, measured as the table does from control
+    /// point `j + 1`.
+    fn too_long(&self, j: usize, curve: &SpanCurve) -> bool {
+        let points = curve.points();
+        (0..self.axes).any(|a| {
+            let base = self.controls[(j + 1) * self.axes + a];
+            points.iter().any(|p| (p[a] - base).abs() > self.demand.reach[a])
+        })
+    }
+
+    /// Judges the open spans. Marks those to split; returns whether control points changed.
+    fn examine(&mut self, split: &mut [bool]) -> Result<bool, Unfit> {
+        let mut changed = false;
+        let mut hint = 0;
+        for j in 0..split.len() {
+            if !self.open[j] {
+                continue;
+            }
+            hint = self.contour.seek(hint, self.knots.at[j] as f64 * self.knots.step);
+            match self.judge(j, hint)? {
+                Verdict::Good => self.open[j] = false,
+                Verdict::Split => split[j] = true,
+                Verdict::Plain => {
+                    changed = true;
+                    for i in j..j + 4 {
+                        self.plain[i] = true;
+                        self.place(i, hint);
+                    }
+                    let reach = j.saturating_sub(3)..(j + 4).min(split.len());
+                    self.open[reach].fill(true);
+                    self.open[j] = false;
+                }
+            }
+        }
+        Ok(changed)
+    }
+
+    fn judge(&self, j: usize, first: usize) -> Result<Verdict, Unfit> {
+        let good = |c: &SpanCurve| within(c, self.contour, first, self.demand.metric);
+        let curve = self.curve(j, &self.controls);
+        if self.too_long(j, &curve) {
+            return Ok(Verdict::Split);
+        }
+        let can_be_plain = self.plain[j..j + 4].contains(&false);
+        if !good(&curve) {
+            let plain = can_be_plain && good(&self.curve(j, &self.samples));
+            return Ok(if plain { Verdict::Plain } else { Verdict::Split });
+        }
+        if fast(&curve, SLOW_PARAMETER) {
+            return Ok(Verdict::Good);
+        }
+        self.judge_slow(j, first, &curve, can_be_plain)
+    }
+
+    /// A span on which the path nearly stands still: follow the contour more closely, or stop.
+    fn judge_slow(&self, j: usize, first: usize, curve: &SpanCurve, can_be_plain: bool) -> Result<Verdict, Unfit> {
+        let (sharpest, turn, tolerance) = self.sharpest_joint(j, first);
+        let wanted = SLOW_PARAMETER.min(0.6 * (0.5 * turn).cos());
+        let slowest = slowest(curve);
+        if slowest >= wanted {
+            return Ok(Verdict::Good);
+        }
+        if can_be_plain {
+            let plain = self.curve(j, &self.samples);
+            let good = within(&plain, self.contour, first, self.demand.metric);
+            if good && self::slowest(&plain) >= wanted {
+                return Ok(Verdict::Plain);
+            }
+        }
+        if curve.length > tolerance / 16.0 {
+            return Ok(Verdict::Split);
+        }
+        match sharpest {
+            Some(k) if slowest < STANDSTILL_PARAMETER => Err(Unfit::StopAt(k)),
+            _ => Ok(Verdict::Good),
+        }
+    }
+
+    /// The sharpest joint under the control points of span `j`, its angle, and the tolerance there.
+    fn sharpest_joint(&self, j: usize, first: usize) -> (Option<usize>, f64, f64) {
+        let u = |i: isize| self.knots.clamped(i) as f64 * self.knots.step;
+        let (from, to) = (u(j as isize - 2), u(j as isize + 3));
+        let mut k = self.contour.seek(first, from);
+        let mut best = (None, 0.0, self.contour.primitives[k].tolerance);
+        while k + 1 < self.contour.primitives.len() && self.contour.ends[k] <= to {
+            k += 1;
+            let p = &self.contour.primitives[k];
+            if p.turn > best.1 {
+                best = (Some(k), p.turn, p.tolerance);
+            }
+        }
+        best
+    }
+
+    /// Halves the marked spans and brings everything that depends on them up to date.
+    fn halve(&mut self, split: &[bool]) -> Result<(), Unfit> {
+        let stuck = (0..split.len()).find(|&i| split[i] && self.knots.length(i) < 2);
+        if let Some(i) = stuck {
+            self.knots.refine(16);
+            let here = self.contour.seek(0, self.knots.at[i] as f64 * self.knots.step);
+            if self.knots.at.last().is_some_and(|&end| end > MOST_STEPS) {
+                return Err(Unfit::TooManySpans(here));
+            }
+        }
+        let origin = self.knots.halve(split);
+        let spans = self.knots.spans();
+        if spans > MOST_SPANS {
+            return Err(Unfit::TooManySpans(0));
+        }
+        let n = self.axes;
+        let old_last = split.len() as isize;
+        // The old index of the new knot i, if the knots from i - back to i + ahead were neighbours before.
+        let kept = |i: isize, back: isize, ahead: isize| -> Option<isize> {
+            let clamp = |k: isize| k.clamp(0, spans as isize) as usize;
+            let here = origin[clamp(i)]? as isize;
+            let shift = if i < 0 { i } else { (i - spans as isize).max(0) };
+            (-back..=ahead)
+                .all(|d| {
+                    let old = (here + shift + d).clamp(0, old_last);
+                    origin[clamp(i + d)].is_some_and(|o| o as isize == old)
+                })
+                .then_some(here + shift)
+        };
+        let mut samples = vec![0.0; (spans + 3) * n];
+        let mut controls = samples.clone();
+        let mut plain = vec![false; spans + 3];
+        let mut stale_sample = vec![false; spans + 3];
+        let mut stale = vec![false; spans + 3];
+        for i in 0..spans + 3 {
+            // Control i rests on knots i-2 ..= i; its neighbours' samples reach one further.
+            match kept(i as isize - 1, 1, 1) {
+                Some(old) => {
+                    let from = (old + 1) as usize;
+                    samples[i * n..][..n].copy_from_slice(&self.samples[from * n..][..n]);
+                    controls[i * n..][..n].copy_from_slice(&self.controls[from * n..][..n]);
+                    plain[i] = self.plain[from];
+                    stale[i] = kept(i as isize - 1, 2, 2).is_none();
+                }
+                None => (stale_sample[i], stale[i]) = (true, true),
+            }
+        }
+        let mut open = vec![true; spans];
+        for (j, open) in open.iter_mut().enumerate() {
+            if let Some(old) = kept(j as isize, 2, 3) {
+                *open = self.open[old as usize] || stale[j..j + 4].contains(&true);
+            }
+        }
+        (self.samples, self.controls, self.plain, self.open) = (samples, controls, plain, open);
+        let mut hint = 0;
+        for i in 0..spans + 3 {
+            if stale_sample[i] {
+                hint = self.sample(i, hint);
+            }
+        }
+        let mut hint = 0;
+        for i in 0..spans + 3 {
+            if stale[i] {
+                hint = self.place(i, hint);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether |r'| >= `limit` on the whole span, by the hull of its Bezier points against the middle direction.
+fn fast(curve: &SpanCurve, limit: f64) -> bool {
+    let middle = curve.derivative(0.5);
+    let size = middle.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let (first, last) = (curve.derivative(0.0), curve.derivative(1.0));
+    let inner: Point = std::array::from_fn(|a| 2.0 * middle[a] - 0.5 * (first[a] + last[a]));
+    [first, inner, last].iter().all(|d| {
+        let along: f64 = d.iter().zip(&middle).map(|(x, y)| x * y).sum();
+        along >= limit * size
+    })
+}
+
+/// The least |r'| on the span, sampled.
+fn slowest(curve: &SpanCurve) -> f64 {
+    let squared = |x: f64| curve.derivative(x).iter().map(|v| v * v).sum::<f64>();
+    (0..=16).map(|i| squared(f64::from(i) / 16.0)).fold(f64::INFINITY, f64::min).sqrt()
+}
