@@ -31,3 +31,14 @@ pub const LSB_OVER_SPAN: f64 = 2.5e-4;
 
 /// A move may start this far from the end of the one before it, relative to the largest coordinate (at least 1).
 pub const CONTOUR_GAP: f64 = 1e-6;
+/// The certificate halves a span until its bound is no further above a ratio that is surely attained.
+pub const CERTIFICATE_TIGHTNESS: f64 = 1e-3;
+
+/// A limit rules where its ratio is within this of one.
+pub const BINDING: f64 = 0.01;
+
+/// The programmed feed counts as reached from this share of it on.
+pub const FEED_REACHED: f64 = 0.99;
+
+/// A stated limit may exceed the machine's by this share: it covers the conversion of units.
+pub const STATED_LIMIT: f64 = 1e-9;

@@ -1,0 +1,1 @@
+//! Proves a whole planned job against a machine, from the tables and the limits alone.
