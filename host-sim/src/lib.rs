@@ -3,4 +3,8 @@
 pub mod axis_scale;
 pub mod encoder;
 pub mod plant;
+pub mod reference;
 pub mod servo;
+pub mod setpoint_hash;
+pub mod statistics;
+pub mod trace;

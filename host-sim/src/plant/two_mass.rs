@@ -60,7 +60,7 @@ impl ElasticPair {
         let omega = 2.0 * PI * two.frequency_hz;
         let rate = omega * (2.0 * two.damping).max(1.0) + plant.viscous / motor;
         let needed = (rate * tick_s / RATE_PER_SUBSTEP).ceil();
-        if !(needed <= f64::from(MAX_SUBSTEPS)) {
+        if needed.is_nan() || needed > f64::from(MAX_SUBSTEPS) {
             return None;
         }
         let substeps = (needed as u32).max(MIN_SUBSTEPS);
