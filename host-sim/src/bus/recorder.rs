@@ -1,0 +1,101 @@
+//! A log of everything that crosses the bus.
+
+use std::io::{self, Write};
+
+use super::{Bus, Frame, FrameFormat, Nanoseconds, NodeIndex, Received, Traffic};
+
+/// FD frames switch to the faster bit rate: the flag digit of can-utils' `##` notation.
+const BIT_RATE_SWITCH: u8 = 1;
+
+/// Listens as one more node and writes every frame as a line of a candump log (can-utils).
+#[derive(Debug)]
+pub struct Recorder<B, W> {
+    inner: B,
+    tap: NodeIndex,
+    interface: String,
+    out: W,
+    failure: Option<io::Error>,
+}
+
+impl<B: Bus, W: Write> Recorder<B, W> {
+    /// Records `inner` under an interface name such as `can0`.
+    pub fn new(mut inner: B, interface: &str, out: W) -> Self {
+        let tap = inner.attach();
+        Self { inner, tap, interface: interface.to_owned(), out, failure: None }
+    }
+
+    /// Ends the log.
+    ///
+    /// # Errors
+    /// The first error met while writing.
+    pub fn finish(mut self) -> io::Result<W> {
+        match self.failure.take() {
+            Some(error) => Err(error),
+            None => self.out.flush().map(|()| self.out),
+        }
+    }
+
+    fn log(&mut self, received: &Received) -> io::Result<()> {
+        let (seconds, micros) = (received.time / 1_000_000_000, received.time / 1000 % 1_000_000);
+        let frame = &received.frame;
+        write!(self.out, "({seconds}.{micros:06}) {} {:03X}#", self.interface, frame.id())?;
+        if frame.format() == FrameFormat::Fd {
+            write!(self.out, "#{BIT_RATE_SWITCH}")?;
+        }
+        for byte in frame.data() {
+            write!(self.out, "{byte:02X}")?;
+        }
+        writeln!(self.out)
+    }
+}
+
+impl<B: Bus, W: Write> Bus for Recorder<B, W> {
+    fn attach(&mut self) -> NodeIndex {
+        self.inner.attach()
+    }
+
+    fn send(&mut self, node: NodeIndex, frame: Frame, now: Nanoseconds) {
+        self.inner.send(node, frame, now);
+    }
+
+    fn advance(&mut self, until: Nanoseconds) {
+        self.inner.advance(until);
+        while let Some(received) = self.inner.receive(self.tap) {
+            if self.failure.is_none() {
+                self.failure = self.log(&received).err();
+            }
+        }
+    }
+
+    fn receive(&mut self, node: NodeIndex) -> Option<Received> {
+        self.inner.receive(node)
+    }
+
+    fn waiting(&self, node: NodeIndex) -> usize {
+        self.inner.waiting(node)
+    }
+
+    fn traffic(&self) -> Traffic {
+        self.inner.traffic()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bus::{BitRates, InProcessBus};
+
+    #[test]
+    fn lines_are_those_of_candump() {
+        let mut bus = Recorder::new(InProcessBus::new(BitRates::default()), "can0", Vec::new());
+        let [a, b] = [bus.attach(), bus.attach()];
+        bus.send(a, Frame::new(0x7f, &[0xde, 0xad], FrameFormat::Classic).unwrap(), 12_000_000_000);
+        bus.send(b, Frame::new(0x100, &[1; 9], FrameFormat::Fd).unwrap(), 12_000_000_000);
+        bus.advance(13_000_000_000);
+        assert_eq!(bus.receive(b).map(|r| r.frame.id()), Some(0x7f));
+        let text = String::from_utf8(bus.finish().unwrap()).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[0], "(12.000075) can0 07F#DEAD");
+        assert!(lines[1].ends_with(" can0 100##1010101010101010101000000"), "{}", lines[1]);
+    }
+}
