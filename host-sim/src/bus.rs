@@ -3,17 +3,16 @@
 //! [`Bus`] is the seam: nodes attach, send and receive; nothing else is known of the medium. [`InProcessBus`] is
 //! the deterministic medium, and decorators change it: [`Lossy`] drops frames, [`Recorder`] writes a candump log.
 
-mod frame;
 mod in_process;
 mod lossy;
 mod recorder;
 mod timing;
 
-pub use frame::{Frame, FrameFormat};
 pub use in_process::InProcessBus;
 pub use lossy::Lossy;
+pub use protocol::bus::{Frame, FrameSize};
 pub use recorder::Recorder;
-pub use timing::BitRates;
+pub use timing::BitTiming;
 
 /// Virtual time since the simulation began [ns].
 pub type Nanoseconds = u64;

@@ -1,28 +1,28 @@
 //! A fingerprint of everything the drives were told to do.
 
-use core::hash::Hasher;
-
-use fnv::FnvHasher;
+use protocol::checksum::Fnv64;
 
 /// FNV-1a (64 bit) over the set-points of a job, in order of tick and then axis.
 ///
 /// Each set-point contributes its tick since the start of its table (u64), axis (u8), position (i64), and the bits
 /// of velocity and acceleration (u32 each), little-endian. Waits between tables do not count: the hash depends on
 /// the tables and the drives' arithmetic alone, not on the speed of the bus or on threads.
-#[derive(Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct SetpointHash {
-    hasher: FnvHasher,
+    hash: Fnv64,
     count: u64,
 }
 
 impl SetpointHash {
     /// Takes in one set-point.
     pub fn add(&mut self, tick: u64, axis: u8, position: i64, velocity: f32, acceleration: f32) {
-        self.hasher.write(&tick.to_le_bytes());
-        self.hasher.write(&[axis]);
-        self.hasher.write(&position.to_le_bytes());
-        self.hasher.write(&velocity.to_bits().to_le_bytes());
-        self.hasher.write(&acceleration.to_bits().to_le_bytes());
+        self.hash = self
+            .hash
+            .with(&tick.to_le_bytes())
+            .with(&[axis])
+            .with(&position.to_le_bytes())
+            .with(&velocity.to_bits().to_le_bytes())
+            .with(&acceleration.to_bits().to_le_bytes());
         self.count += 1;
     }
 
@@ -33,7 +33,7 @@ impl SetpointHash {
 
     /// The hash.
     pub fn value(&self) -> u64 {
-        self.hasher.finish()
+        self.hash.finish()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{BitRates, Bus, Frame, Nanoseconds, NodeIndex, Received, Traffic};
+use super::{BitTiming, Bus, Frame, Nanoseconds, NodeIndex, Received, Traffic};
 
 /// A bus that loses nothing and is the same on every run.
 ///
@@ -10,7 +10,7 @@ use super::{BitRates, Bus, Frame, Nanoseconds, NodeIndex, Received, Traffic};
 /// identifier among the oldest frames of all nodes goes next; equal identifiers go by node.
 #[derive(Clone, Debug)]
 pub struct InProcessBus {
-    rates: BitRates,
+    timing: BitTiming,
     nodes: Vec<Node>,
     idle_from: Nanoseconds,
     traffic: Traffic,
@@ -24,8 +24,8 @@ struct Node {
 
 impl InProcessBus {
     /// An idle bus without nodes.
-    pub fn new(rates: BitRates) -> Self {
-        Self { rates, nodes: Vec::new(), idle_from: 0, traffic: Traffic::default() }
+    pub fn new(timing: BitTiming) -> Self {
+        Self { timing, nodes: Vec::new(), idle_from: 0, traffic: Traffic::default() }
     }
 
     /// Sender, start and frame of the next transmission.
@@ -53,7 +53,7 @@ impl Bus for InProcessBus {
 
     fn advance(&mut self, until: Nanoseconds) {
         while let Some((sender, start, frame)) = self.next() {
-            let busy = self.rates.duration(&frame);
+            let busy = self.timing.duration(&frame);
             let end = start + busy;
             if end > until {
                 return;
@@ -88,10 +88,9 @@ impl Bus for InProcessBus {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bus::FrameFormat;
 
     fn frame(id: u16) -> Frame {
-        Frame::new(id, &[0; 8], FrameFormat::Classic).unwrap()
+        Frame::new(id, &[0; 8]).unwrap()
     }
 
     fn drain(bus: &mut InProcessBus, node: NodeIndex) -> Vec<(u64, u16)> {
@@ -100,7 +99,7 @@ mod tests {
 
     #[test]
     fn the_lowest_identifier_wins_once_the_wire_is_idle() {
-        let mut bus = InProcessBus::new(BitRates::default());
+        let mut bus = InProcessBus::new(BitTiming::default());
         let [a, b, listener] = [bus.attach(), bus.attach(), bus.attach()];
         bus.send(a, frame(0x300), 0);
         bus.send(a, frame(0x100), 0);
@@ -115,7 +114,7 @@ mod tests {
 
     #[test]
     fn nothing_arrives_before_its_last_bit() {
-        let mut bus = InProcessBus::new(BitRates::default());
+        let mut bus = InProcessBus::new(BitTiming::default());
         let [a, b] = [bus.attach(), bus.attach()];
         bus.send(a, frame(1), 5_000);
         bus.advance(139_999);
@@ -128,7 +127,7 @@ mod tests {
 
     #[test]
     fn one_node_keeps_its_own_order() {
-        let mut bus = InProcessBus::new(BitRates::default());
+        let mut bus = InProcessBus::new(BitTiming::default());
         let [a, b] = [bus.attach(), bus.attach()];
         for id in [9, 3, 7, 1] {
             bus.send(a, frame(id), 0);

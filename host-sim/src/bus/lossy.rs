@@ -59,13 +59,13 @@ impl<B: Bus> Bus for Lossy<B> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bus::{BitRates, FrameFormat, InProcessBus};
+    use crate::bus::{BitTiming, InProcessBus};
 
     fn survivors(loss: f64, seed: u64) -> Vec<u64> {
-        let mut bus = Lossy::new(InProcessBus::new(BitRates::default()), loss, seed);
+        let mut bus = Lossy::new(InProcessBus::new(BitTiming::default()), loss, seed);
         let [a, b] = [bus.attach(), bus.attach()];
         for _ in 0..2000 {
-            bus.send(a, Frame::new(5, &[1], FrameFormat::Classic).unwrap(), 0);
+            bus.send(a, Frame::new(5, &[1]).unwrap(), 0);
         }
         bus.advance(u64::MAX);
         let got: Vec<u64> = core::iter::from_fn(|| bus.receive(b)).map(|r| r.time).collect();

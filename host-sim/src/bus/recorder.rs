@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::{Bus, Frame, FrameFormat, Nanoseconds, NodeIndex, Received, Traffic};
+use super::{Bus, Frame, FrameSize, Nanoseconds, NodeIndex, Received, Traffic};
 
 /// FD frames switch to the faster bit rate: the flag digit of can-utils' `##` notation.
 const BIT_RATE_SWITCH: u8 = 1;
@@ -13,15 +13,16 @@ pub struct Recorder<B, W> {
     inner: B,
     tap: NodeIndex,
     interface: String,
+    format: FrameSize,
     out: W,
     failure: Option<io::Error>,
 }
 
 impl<B: Bus, W: Write> Recorder<B, W> {
-    /// Records `inner` under an interface name such as `can0`.
-    pub fn new(mut inner: B, interface: &str, out: W) -> Self {
+    /// Records `inner`, which carries frames of one format, under an interface name such as `can0`.
+    pub fn new(mut inner: B, format: FrameSize, interface: &str, out: W) -> Self {
         let tap = inner.attach();
-        Self { inner, tap, interface: interface.to_owned(), out, failure: None }
+        Self { inner, tap, interface: interface.to_owned(), format, out, failure: None }
     }
 
     /// Ends the log.
@@ -39,7 +40,7 @@ impl<B: Bus, W: Write> Recorder<B, W> {
         let (seconds, micros) = (received.time / 1_000_000_000, received.time / 1000 % 1_000_000);
         let frame = &received.frame;
         write!(self.out, "({seconds}.{micros:06}) {} {:03X}#", self.interface, frame.id())?;
-        if frame.format() == FrameFormat::Fd {
+        if self.format == FrameSize::Fd {
             write!(self.out, "#{BIT_RATE_SWITCH}")?;
         }
         for byte in frame.data() {
@@ -83,19 +84,22 @@ impl<B: Bus, W: Write> Bus for Recorder<B, W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bus::{BitRates, InProcessBus};
+    use crate::bus::{BitTiming, InProcessBus};
+
+    fn log(format: FrameSize, data: &[u8]) -> String {
+        let timing = BitTiming { format, ..BitTiming::default() };
+        let mut bus = Recorder::new(InProcessBus::new(timing), format, "can0", Vec::new());
+        let [a, b] = [bus.attach(), bus.attach()];
+        bus.send(a, Frame::new(0x7f, data).unwrap(), 12_000_000_000);
+        bus.advance(13_000_000_000);
+        assert_eq!(bus.receive(b).map(|r| r.frame.id()), Some(0x7f));
+        String::from_utf8(bus.finish().unwrap()).unwrap()
+    }
 
     #[test]
     fn lines_are_those_of_candump() {
-        let mut bus = Recorder::new(InProcessBus::new(BitRates::default()), "can0", Vec::new());
-        let [a, b] = [bus.attach(), bus.attach()];
-        bus.send(a, Frame::new(0x7f, &[0xde, 0xad], FrameFormat::Classic).unwrap(), 12_000_000_000);
-        bus.send(b, Frame::new(0x100, &[1; 9], FrameFormat::Fd).unwrap(), 12_000_000_000);
-        bus.advance(13_000_000_000);
-        assert_eq!(bus.receive(b).map(|r| r.frame.id()), Some(0x7f));
-        let text = String::from_utf8(bus.finish().unwrap()).unwrap();
-        let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(lines[0], "(12.000075) can0 07F#DEAD");
-        assert!(lines[1].ends_with(" can0 100##1010101010101010101000000"), "{}", lines[1]);
+        assert_eq!(log(FrameSize::Classic, &[0xde, 0xad]), "(12.000075) can0 07F#DEAD\n");
+        let fd = log(FrameSize::Fd, &[1; 9]);
+        assert!(fd.ends_with(" can0 07F##1010101010101010101000000\n"), "{fd}");
     }
 }

@@ -4,21 +4,23 @@
 //! its data, a stuff bit follows every fifth equal bit; stuff bits count themselves, so the worst case is one per
 //! four bits. The CRC field of an FD frame has a fixed stuff bit before every fourth bit instead.
 
-use super::{Frame, FrameFormat, Nanoseconds};
+use super::{Frame, FrameSize, Nanoseconds};
 
-/// Bit rates of the bus.
+/// Frame format and bit rates of a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BitRates {
+pub struct BitTiming {
+    /// Format of all frames.
+    pub format: FrameSize,
     /// Of classic frames, and of the arbitration part of FD frames [bit/s].
     pub nominal: u32,
     /// Of the data part of FD frames [bit/s].
     pub data: u32,
 }
 
-/// Classic CAN at 1 Mbit/s, FD data at 5 Mbit/s.
-impl Default for BitRates {
+/// Classic CAN at 1 Mbit/s.
+impl Default for BitTiming {
     fn default() -> Self {
-        Self { nominal: 1_000_000, data: 5_000_000 }
+        Self { format: FrameSize::Classic, nominal: 1_000_000, data: 5_000_000 }
     }
 }
 
@@ -29,17 +31,17 @@ const FD_TRAILER_BITS: u64 = 2 + 7 + 3;
 /// ESI and DLC of an FD frame.
 const FD_CONTROL_BITS: u64 = 1 + 4;
 
-impl BitRates {
+impl BitTiming {
     /// Longest time that `frame` keeps the wire busy, interframe space included.
     pub fn duration(&self, frame: &Frame) -> Nanoseconds {
         let bits = 8 * frame.data().len() as u64;
-        match frame.format() {
-            FrameFormat::Classic => {
+        match self.format {
+            FrameSize::Classic => {
                 // 34 stuffed bits and data; CRC delimiter, acknowledgement, end of frame, interframe space.
                 let stuffed = 34 + bits;
                 self.nominal_time(stuffed + (stuffed - 1) / 4 + 13)
             }
-            FrameFormat::Fd => {
+            FrameSize::Fd => {
                 let stuffed = FD_ARBITRATION_BITS + FD_CONTROL_BITS + bits;
                 let early = (FD_ARBITRATION_BITS - 1) / 4;
                 let late = (stuffed - 1) / 4 - early;
@@ -64,26 +66,27 @@ impl BitRates {
 mod tests {
     use super::*;
 
-    fn us(rates: BitRates, format: FrameFormat, length: usize) -> f64 {
-        let frame = Frame::new(0x123, &vec![0; length], format).unwrap();
-        rates.duration(&frame) as f64 / 1000.0
+    fn us(timing: BitTiming, length: usize) -> f64 {
+        let frame = Frame::new(0x123, &vec![0; length]).unwrap();
+        timing.duration(&frame) as f64 / 1000.0
     }
 
     #[test]
     fn classic_frames_take_the_worst_case_of_the_literature() {
         // Davis et al. 2007, "Controller Area Network schedulability analysis", eq. 1: 55 + 10 s bits.
         for length in 0..=8 {
-            assert_eq!(us(BitRates::default(), FrameFormat::Classic, length), 55.0 + 10.0 * length as f64);
+            assert_eq!(us(BitTiming::default(), length), 55.0 + 10.0 * length as f64);
         }
-        let slow = BitRates { nominal: 125_000, ..BitRates::default() };
-        assert_eq!(us(slow, FrameFormat::Classic, 8), 8.0 * 135.0);
+        let slow = BitTiming { nominal: 125_000, ..BitTiming::default() };
+        assert_eq!(us(slow, 8), 8.0 * 135.0);
     }
 
     #[test]
     fn a_full_fd_frame_takes_a_sixth_of_a_millisecond_at_five_megabit() {
-        let t = us(BitRates::default(), FrameFormat::Fd, 64);
+        let fd = BitTiming { format: FrameSize::Fd, ..BitTiming::default() };
+        let t = us(fd, 64);
         assert!((165.0..172.0).contains(&t), "{t}");
-        let t = us(BitRates { data: 2_000_000, ..BitRates::default() }, FrameFormat::Fd, 64);
+        let t = us(BitTiming { data: 2_000_000, ..fd }, 64);
         assert!((365.0..376.0).contains(&t), "{t}");
     }
 }
