@@ -6,3 +6,6 @@ pub const CERTIFICATE_RATIO: f64 = 1e-6;
 
 /// Relative size below which a length counts as zero against the extent of the job.
 pub const ZERO_LENGTH: f64 = 1e-9;
+
+/// A row of the feed problem, evaluated at the rounded control values in f64, may exceed its bound by this much.
+pub const ROW_ARITHMETIC: f64 = 1e-9;
