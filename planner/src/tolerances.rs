@@ -42,3 +42,5 @@ pub const FEED_REACHED: f64 = 0.99;
 
 /// A stated limit may exceed the machine's by this share: it covers the conversion of units.
 pub const STATED_LIMIT: f64 = 1e-9;
+/// A row of the feed problem, evaluated at the rounded control values in f64, may exceed its bound by this much.
+pub const ROW_ARITHMETIC: f64 = 1e-9;
