@@ -150,6 +150,27 @@ pub enum PathFault {
     Range,
 }
 
+impl PlanError {
+    /// The place on the path that it is about, in u.
+    pub fn place(&self) -> Option<f64> {
+        match *self {
+            PlanError::Cap { u, .. }
+            | PlanError::Slow { u, .. }
+            | PlanError::Uneven { u, .. }
+            | PlanError::Resolution { u, .. } => Some(u),
+            PlanError::AxisCount { .. }
+            | PlanError::LimitCount { .. }
+            | PlanError::Limit { .. }
+            | PlanError::CapOrder { .. }
+            | PlanError::Path { .. }
+            | PlanError::TooShort { .. }
+            | PlanError::NothingMoves
+            | PlanError::Setting { .. }
+            | PlanError::Solver => None,
+        }
+    }
+}
+
 fn finite_hint(kind: &LimitKind) -> &'static str {
     match kind {
         LimitKind::Jerk => " (infinite: no jerk limit)",
