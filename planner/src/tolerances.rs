@@ -18,3 +18,7 @@ pub const FEED_REACHED: f64 = 0.99;
 
 /// A stated limit may exceed the machine's by this share: it covers the conversion of units.
 pub const STATED_LIMIT: f64 = 1e-9;
+
+/// Largest |gamma| w^2 of a span: 1/4, up to which the drives' series are exact to f32, with room for the
+/// rounding of their own check.
+pub const TABLE_SERIES_ARGUMENT: f64 = 0.25 * (1.0 + 1e-5);
