@@ -44,3 +44,7 @@ pub const FEED_REACHED: f64 = 0.99;
 pub const STATED_LIMIT: f64 = 1e-9;
 /// A row of the feed problem, evaluated at the rounded control values in f64, may exceed its bound by this much.
 pub const ROW_ARITHMETIC: f64 = 1e-9;
+
+/// Largest |gamma| w^2 of a span: 1/4, up to which the drives' series are exact to f32, with room for the
+/// rounding of their own check.
+pub const TABLE_SERIES_ARGUMENT: f64 = 0.25 * (1.0 + 1e-5);

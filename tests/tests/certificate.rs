@@ -7,6 +7,7 @@ use planner::job::machine::AxisLimits;
 use proptest::prelude::*;
 use tests::oracle::dense::{Ratios, Reading, largest_ratios};
 use tests::oracle::random_table::{Dice, random_table};
+use tests::oracle::real::{Pair, Real};
 
 const PER_SPAN: usize = 100;
 
@@ -99,10 +100,49 @@ proptest! {
         prop_assert!(!(broken && caught.holds), "{caught:?} {sampled:?}");
     }
 
+    /// With 32 digits on the oracle's side no allowance is made for rounding: the bound must be above, even where
+    /// it is attained at a knot and differences of nearly equal numbers lose most of their digits.
+    #[test]
+    fn rounding_is_outwards(seed in any::<u64>(), far in 0u32..30, wide in 0u32..12) {
+        let mut dice = Dice::new(seed);
+        let mut table = random_table(&mut dice, 2, 12);
+        let push = i64::try_from(1u64 << far).unwrap();
+        for a in &mut table.path.axes {
+            a.lsb *= dice.real(0.5, 1.0);
+            // Nearly the same slope everywhere, so that the higher derivatives are differences of large numbers.
+            for (i, c) in a.controls.iter_mut().enumerate() {
+                *c += push * i64::try_from(i).unwrap();
+            }
+        }
+        // One long span beside short ones.
+        table.steps[3] <<= wide;
+        let mut place = 0;
+        let knots: Vec<u64> = table.steps.iter().map(|&s| { place += u64::from(s); place }).collect();
+        table.path.breaks[1] = knots[3.min(knots.len() - 2)];
+        table.path.breaks.truncate(2);
+        table.path.breaks.push(place);
+        table.path.axes.iter_mut().for_each(|a| a.controls.truncate(5));
+        let proven = certify(&table, &unit_limits(2), &[]);
+        prop_assert_eq!(proven.defect, None);
+        let reading = Reading::<Pair>::of(&table);
+        let above = |bound: f64, x: Pair| {
+            (Pair::from(bound) - x).near() >= 0.0 && (Pair::from(bound) + x).near() >= 0.0
+        };
+        for span in 0..reading.spans() {
+            for s in [0.0, 0.25, 0.5, 0.75, 1.0] {
+                for [_, v, a, j] in reading.at(span, s).axes {
+                    prop_assert!(above(proven.velocity_ratio, v));
+                    prop_assert!(above(proven.acceleration_ratio, a));
+                    prop_assert!(above(proven.jerk_ratio, j), "{} {j:?}", proven.jerk_ratio);
+                }
+            }
+        }
+    }
+
     #[test]
     fn position_bounds_enclose_every_sample(seed in any::<u64>()) {
         let table = random_table(&mut Dice::new(seed), 2, 40);
-        let reading = Reading::of(&table);
+        let reading = Reading::<f64>::of(&table);
         for axis in 0..2 {
             let [low, high] = position_bounds(&table, axis);
             let samples = (0..reading.spans())

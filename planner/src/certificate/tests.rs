@@ -1,15 +1,7 @@
 use super::*;
+use crate::analysis::samples::bent_table as sample;
 use crate::geometry::grid_path::{GridAxis, GridPath};
 use crate::geometry::section::SpeedCap;
-
-/// A bent path of 10 units with a gentle motion on it.
-pub(super) fn sample() -> FeedTable {
-    let x = GridAxis { lsb: 1e-3, controls: vec![0, 300, 2000, 4500, 7400, 8900, 9300] };
-    let y = GridAxis { lsb: 1e-3, controls: vec![0, 10, 400, 1900, 4600, 6300, 6400] };
-    let path = GridPath { step: 1.0 / 64.0, breaks: vec![0, 100, 230, 440, 640], axes: vec![x, y] };
-    let codes = vec![900, 2000, 2500, 2600, 2400, 1000];
-    FeedTable { path, steps: vec![20, 40, 40, 130, 210, 100, 80, 20], q_scale: 1e-5, codes }
-}
 
 fn limits(velocity: f64, acceleration: f64, jerk: f64) -> Vec<AxisLimits> {
     vec![AxisLimits { velocity, acceleration, jerk }; 2]

@@ -2,4 +2,5 @@
 
 pub mod dense;
 pub mod random_table;
+pub mod real;
 pub mod spline;
