@@ -17,6 +17,10 @@ pub struct Machine {
     pub tolerance_mm: f64,
     /// Path tolerance of the rotary axes [axis unit].
     pub tolerance_rotary: f64,
+    /// Path tolerance of G64 without P [mm].
+    pub best_speed_mm: f64,
+    /// How far exact path mode (G61) may leave the contour [mm].
+    pub exact_path_mm: f64,
     /// Joints of blocks when the program says nothing.
     pub corner: CornerMode,
     /// The axes, in the order of the file; at most [`MAX_AXES`].

@@ -100,8 +100,26 @@ pub enum Corner {
     Stop,
     /// G61: programmed points are hit; rest only where the direction changes.
     Exact,
-    /// G64 and defaults: stay within this distance of the programmed contour [mm], nothing more.
-    Within(f64),
+    /// G64 and defaults: stay within this distance of the programmed contour, nothing more.
+    Within {
+        /// The distance [mm].
+        tolerance_mm: f64,
+        /// Who asked for it.
+        source: ToleranceSource,
+    },
+}
+
+/// Who set a path tolerance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ToleranceSource {
+    /// G64 P in the program.
+    Program,
+    /// The machine file; the program says nothing.
+    Machine,
+    /// The command line, over program and machine.
+    CommandLine,
+    /// G64 without P: the machine's best-speed tolerance.
+    BestSpeed,
 }
 
 /// Why motion comes to rest.
