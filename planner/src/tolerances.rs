@@ -67,3 +67,10 @@ pub const ARC_REACH_MM: f64 = 0.00127;
 
 /// Least radius of an arc [mm]: a nanometre is below the resolution of every machine.
 pub const ARC_RADIUS_LEAST_MM: f64 = 1e-6;
+/// The unit of an axis' control points may differ from a power of two of a count by this share: it covers the
+/// rounding of the unit and of the counts per axis unit.
+pub const LSB_RATIO: f64 = 1e-12;
+
+/// A span's duration keeps this share away from the shortest and longest that drives accept: they compute it in
+/// f32.
+pub const FORMAT_MARGIN: f64 = 1e-6;
