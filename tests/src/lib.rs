@@ -1,1 +1,3 @@
 //! Oracles, generators and shared pieces of the whole-product suites.
+
+pub mod tables;

@@ -138,7 +138,7 @@ impl LawCursor {
 
     /// The same with a duration [s].
     fn lasting(mut self, seconds: f32) -> Result<Self, TableError> {
-        let duration = (seconds * PATH_TIME_PER_S) as u64;
+        let duration = (seconds * PATH_TIME_PER_S + 0.5) as u64;
         if !seconds.is_finite() || duration == 0 || duration >= MAX_SPAN_TIME {
             return Err(TableError::Slow { index: self.index });
         }

@@ -103,7 +103,9 @@ impl PieceCursor {
         let c1 = (e0 * h + e1 * a) / before;
         let c3 = (s1 - s0) / (6.0 * h);
         let split = |point: i64| (point >> bits.min(62), (point & ((1 << bits.min(62)) - 1)) as f32 * unit);
-        let (base, rest) = split(p1);
+        // At the start of the path p0 is the position itself.
+        let (origin, c0) = if l1 == 0 { (p0, 0.0) } else { (p1, c0) };
+        let (base, rest) = split(origin);
         self.forward = Cubic { base, power: [rest + c0, c1, 0.5 * s0, c3] };
         let (base, rest) = split(p3);
         self.backward = Cubic { base, power: [rest, -e2, 0.5 * s1, -c3] };

@@ -1,4 +1,6 @@
 //! The feed table: what is certified, simulated, stored and sent.
 
+pub mod file;
 pub mod job;
+pub mod pack;
 pub mod table;

@@ -1,5 +1,7 @@
 //! A section: a stretch of path between two rests, with all that the feed problem needs to know about it.
 
+use serde::{Deserialize, Serialize};
+
 use super::grid_path::GridPath;
 use crate::job::program::{MoveKind, StopCause};
 
@@ -37,7 +39,7 @@ pub struct FeedCap {
 }
 
 /// How fast the path may be travelled, besides the axis limits.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum SpeedCap {
     /// No cap.
     None,
@@ -62,7 +64,7 @@ pub struct BlockMark {
 }
 
 /// Distance between the path and the programmed contour, both directions.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Deviation {
     /// Allowed [mm], the largest value in force in the section.
     pub tolerance_mm: f64,

@@ -1,5 +1,7 @@
 //! The machine: its axes, their limits, their drives.
 
+use serde::{Deserialize, Serialize};
+
 /// Most axes one job can move.
 pub const MAX_AXES: usize = 9;
 
@@ -73,7 +75,7 @@ pub struct Axis {
 }
 
 /// How an axis moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AxisKind {
     /// A slide; positions in millimetres.
     Linear,
@@ -82,7 +84,7 @@ pub enum AxisKind {
 }
 
 /// Unit of an axis position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Unit {
     /// Millimetre.
     Mm,
@@ -93,7 +95,7 @@ pub enum Unit {
 }
 
 /// Velocity, acceleration and jerk bounds of one axis, symmetric, per second^n in the axis unit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AxisLimits {
     /// Largest |velocity|.
     pub velocity: f64,

@@ -1,5 +1,7 @@
 //! A part program as the planner sees it: a stream of moves, dwells and stops, whatever language it came in.
 
+use serde::{Deserialize, Serialize};
+
 use super::machine::Point;
 
 /// One thing the machine has to do, in program order.
@@ -50,7 +52,7 @@ pub struct Move {
 }
 
 /// Rapid or feed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MoveKind {
     /// As fast as the axes' rapid limits allow, on a straight line in axis space.
     Rapid,
@@ -105,7 +107,7 @@ pub enum Corner {
 }
 
 /// Why motion comes to rest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum StopCause {
     /// M0, M1, M60.
     ProgramStop,
