@@ -236,7 +236,7 @@ impl<'a> HostNode<'a> {
 
     /// Takes up the next order once the drives have a buffer free: when the table before it plays.
     fn begin(&mut self, tick: u64) -> Phase<'a> {
-        while self.runs.len() > 1 {
+        while self.runs.len() > 1 && self.runs[0].start + self.runs[0].ticks < tick {
             self.runs.pop_front();
         }
         match self.orders.get(self.next) {
