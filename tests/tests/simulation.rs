@@ -31,10 +31,10 @@ fn axis(name: &str, unit: Unit) -> Axis {
         limits,
         rapid: limits,
         plant: Plant {
-            inertia: 30.0,
-            viscous: 40.0,
-            coulomb: 15.0,
-            effort_limit: 600.0,
+            inertia: if unit == Unit::Mm { 30.0 } else { 0.5 },
+            viscous: if unit == Unit::Mm { 40.0 } else { 0.1 },
+            coulomb: if unit == Unit::Mm { 15.0 } else { 0.4 },
+            effort_limit: if unit == Unit::Mm { 600.0 } else { 60.0 },
             encoder_counts_per_count: 4.0,
             two_mass: None,
         },
@@ -299,6 +299,27 @@ fn the_bus_log_shows_every_frame() {
     let log = String::from_utf8(bus.finish().unwrap()).unwrap();
     assert_eq!(log.lines().count() as u64, report.bus.frames);
     assert!(log.lines().all(|l| l.starts_with('(') && l.contains(" can0 ")));
+}
+
+#[test]
+fn simulation_is_much_faster_than_the_machine() {
+    // Back and forth, two minutes of motion of three elastic axes at 1 kHz.
+    let mut soft = machine();
+    for axis in &mut soft.axes {
+        axis.plant.two_mass = Some(TwoMass { load_share: 0.5, frequency_hz: 60.0, damping: 0.05 });
+    }
+    let there = |u: f64| [u, 0.5 * u, 0.25 * u];
+    let out = section(100.0, 100.0, there);
+    let reach = end_of(&out)[0];
+    let back = section(100.0, 100.0, |u| there(reach - u));
+    let job: Vec<JobItem> =
+        (0..96).map(|i| JobItem::Section(if i % 2 == 0 { out.clone() } else { back.clone() })).collect();
+    let began = std::time::Instant::now();
+    let report = attempt(&job, &soft, &SimSettings::default()).unwrap();
+    let speed = report.cycle_time_s / began.elapsed().as_secs_f64();
+    assert!(report.at_end && report.cycle_time_s > 110.0);
+    assert!(speed > 20.0, "{speed} times real time");
+    println!("{speed:.0} times real time");
 }
 
 #[test]
