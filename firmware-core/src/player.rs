@@ -230,6 +230,9 @@ impl<'a> Player<'a> {
         if header.tick_ns != self.config.tick_ns {
             return Err(Reject::Tick { tick_ns: self.config.tick_ns });
         }
+        if self.side_of(header.table).is_some() {
+            return Err(Reject::Busy);
+        }
         let side = [Side::A, Side::B].into_iter().find(|side| !self.is_used(*side)).ok_or(Reject::Busy)?;
         self.slot_mut(side).open(header)
     }

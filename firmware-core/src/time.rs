@@ -67,7 +67,7 @@ mod tests {
         fn the_clock_shows_the_exact_product(tick_ns in 1u32..=1_000_000_000, n in 0u64..2000) {
             let mut clock = PathClock::new(tick_ns);
             (0..n).for_each(|_| clock.advance());
-            let exact = (u128::from(n) * u128::from(tick_ns) << 32) / u128::from(NS_PER_S);
+            let exact = ((u128::from(n) * u128::from(tick_ns)) << 32) / u128::from(NS_PER_S);
             prop_assert_eq!(u128::from(clock.time()), exact);
         }
 

@@ -167,7 +167,7 @@ pub enum Reject {
         /// Where the motion before it ends [counts].
         position: i64,
     },
-    /// Both table buffers are in use: one table plays and one is armed.
+    /// A table plays or is armed: both buffers are taken, or the number is, or another start is pending.
     Busy,
     /// No such table is open.
     NotOpen,

@@ -15,3 +15,6 @@ pub mod span;
 
 pub use error::{HeaderField, Stream, TableError};
 pub use header::{AxisHeader, FORMAT_VERSION, Limits, TableHeader};
+
+#[cfg(test)]
+mod tests;

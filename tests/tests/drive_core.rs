@@ -1,4 +1,5 @@
 //! The drive's f32 core against the f64 law of the same tables.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
 use firmware_core::evaluate::{Cursor, Setpoint};
 use firmware_core::table::{CheckedTable, TableView};

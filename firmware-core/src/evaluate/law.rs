@@ -123,7 +123,7 @@ impl LawCursor {
         let gamma = (self.slope - d0) / h;
         let w = h / (v0 + self.speed);
         let bend = gamma * w * w;
-        if !(bend.abs() <= MAX_BEND * BEND_SLACK) {
+        if bend.is_nan() || bend.abs() > MAX_BEND * BEND_SLACK {
             return Err(TableError::Bend { index });
         }
         self.law = Law::Quadratic { v0, d: d0, gamma };

@@ -2,5 +2,6 @@
 
 pub mod file;
 pub mod job;
+pub mod messages;
 pub mod pack;
 pub mod table;

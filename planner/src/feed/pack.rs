@@ -367,4 +367,4 @@ impl std::ops::AddAssign for TableBytes {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

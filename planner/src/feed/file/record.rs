@@ -225,3 +225,11 @@ fn blocks(runs: &[BlockRun], length: u64) -> Option<Vec<BlockMark>> {
     let marks = marks.collect::<Option<Vec<_>>>()?;
     (until == length).then_some(marks)
 }
+
+#[cfg(test)]
+impl Section {
+    /// Makes the first axis' header contradict its control points.
+    pub(super) fn shift_end_for_test(&mut self) {
+        self.axes[0].header.end += 1;
+    }
+}
