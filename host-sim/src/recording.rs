@@ -19,6 +19,7 @@ use crate::trace::{AxisSample, TraceHeader, TraceRow, TraceSink};
 /// that it is about to command: what [`Recording::tick`] takes in at one tick is followed at the next.
 pub struct Recording<'a> {
     machine: &'a Machine,
+    tick_s: f64,
     loops: Vec<AxisLoop>,
     linear: Vec<usize>,
     present: Vec<CountSetpoint>,
@@ -33,19 +34,20 @@ pub struct Recording<'a> {
 }
 
 impl<'a> Recording<'a> {
-    /// All axes at rest at `origin` [counts].
+    /// All axes at rest at `origin` [counts], in control ticks of `tick_s`.
     ///
     /// # Errors
     /// Index of the first axis whose plant or servo has parameters out of range, and what is wrong with it.
-    pub fn new(machine: &'a Machine, origin: &[i64]) -> Result<Self, (usize, AxisLoopError)> {
+    pub fn new(machine: &'a Machine, tick_s: f64, origin: &[i64]) -> Result<Self, (usize, AxisLoopError)> {
         let mut loops = Vec::new();
         for (i, (axis, &origin)) in machine.axes.iter().zip(origin).enumerate() {
-            loops.push(AxisLoop::new(axis, machine.control_tick_s, origin).map_err(|e| (i, e))?);
+            loops.push(AxisLoop::new(axis, tick_s, origin).map_err(|e| (i, e))?);
         }
         let at = |&position: &i64| CountSetpoint { position, ..CountSetpoint::default() };
         let linear = (0..loops.len()).filter(|&i| is_linear(&machine.axes[i])).collect();
         Ok(Self {
             machine,
+            tick_s,
             linear,
             present: origin.iter().map(at).collect(),
             samples: vec![AxisSample::default(); loops.len()],
@@ -72,7 +74,7 @@ impl<'a> Recording<'a> {
             names: axes.iter().map(|a| a.name.clone()).collect(),
             units: axes.iter().map(|a| unit(a.unit)).collect(),
             effort_units: axes.iter().map(|a| if a.kind == AxisKind::Linear { "N" } else { "Nm" }).collect(),
-            tick_s: self.machine.control_tick_s,
+            tick_s: self.tick_s,
             expected_ticks,
         }
     }
@@ -101,11 +103,7 @@ impl<'a> Recording<'a> {
         }
         self.present.copy_from_slice(next);
         self.measure_contour();
-        let row = TraceRow {
-            tick: self.ticks,
-            time_s: self.ticks as f64 * self.machine.control_tick_s,
-            axes: &self.samples,
-        };
+        let row = TraceRow { tick: self.ticks, time_s: self.ticks as f64 * self.tick_s, axes: &self.samples };
         self.ticks += 1;
         sink.row(&row)
     }
@@ -115,7 +113,7 @@ impl<'a> Recording<'a> {
             self.hash.add(tick, axis as u8, s.position, s.velocity, s.acceleration);
         }
         let Some(motion) = &mut self.motion else { return };
-        let x = motion.seek(tick as f64 * self.machine.control_tick_s);
+        let x = motion.seek(tick as f64 * self.tick_s);
         for (axis, s) in next.iter().enumerate() {
             let planned = motion.position(axis, x, self.machine.axes[axis].counts_per_unit);
             let off = (s.position as f64 - planned).abs();

@@ -9,16 +9,18 @@ pub struct SimReport {
     pub setpoints: u64,
     /// Fingerprint of them, see [`crate::setpoint_hash::SetpointHash`].
     pub setpoint_hash: u64,
-    /// Control ticks simulated.
+    /// Control ticks simulated, from the start of the first table to the end of settling.
     pub ticks: u64,
-    /// Time simulated, with everything [s].
-    pub duration_s: f64,
-    /// Time in motion [s].
+    /// From the start of the first table to the end of the last motion or wait [s].
+    pub cycle_time_s: f64,
+    /// Duration of the tables in the plan [s].
     pub motion_s: f64,
     /// Programmed waits [s].
     pub dwell_s: f64,
-    /// The rest: sending the first table, rounding to ticks, handing over from table to table, settling [s].
-    pub overhead_s: f64,
+    /// What the cycle time has besides motion and waits: whole ticks, and waiting for the next table [s].
+    pub handover_s: f64,
+    /// Sending and checking the first table, before the cycle [s].
+    pub preparation_s: f64,
     /// Greatest distance of a set-point from the plan evaluated in f64 at the same time [counts].
     pub max_path_deviation_counts: f64,
     /// Greatest following error of any linear axis [mm].
@@ -73,10 +75,16 @@ pub struct BusReport {
     pub frames: u64,
     /// Payload bytes in them.
     pub bytes: u64,
-    /// Share of the simulated time that the wire was busy, worst-case stuffing assumed.
+    /// Share of the time from power-up to the end that the wire was busy, worst-case stuffing assumed.
     pub load: f64,
+    /// Busy time per time of motion.
+    pub busy_per_motion: f64,
     /// Payload bytes per second of motion.
     pub bytes_per_motion_second: f64,
     /// Blocks that had to be sent again.
     pub resent_blocks: u64,
+    /// Starts that were called off because a drive did not confirm in time.
+    pub aborted_starts: u64,
+    /// Memory that each drive needs for its two table buffers [bytes].
+    pub drive_buffer_bytes: u64,
 }
