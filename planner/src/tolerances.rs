@@ -31,3 +31,7 @@ pub const LSB_OVER_SPAN: f64 = 2.5e-4;
 
 /// A move may start this far from the end of the one before it, relative to the largest coordinate (at least 1).
 pub const CONTOUR_GAP: f64 = 1e-6;
+
+/// A move also has to be below this share of a drive count to count as zero: far from the origin
+/// [`ZERO_LENGTH`] alone would swallow counts.
+pub const ZERO_COUNT: f64 = 1e-3;

@@ -375,3 +375,6 @@ where
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
