@@ -186,7 +186,9 @@ fn piece_within(
     if size(&d[0]) > allowed || size(&d[3]) > allowed {
         return false;
     }
-    if size(&d[1]).max(size(&d[2])) + remainder <= allowed && size(&d[0]).max(size(&d[3])) + remainder <= allowed {
+    if size(&d[1]).max(size(&d[2])) + remainder <= allowed
+        && size(&d[0]).max(size(&d[3])) + remainder <= allowed
+    {
         return true;
     }
     let middle = 0.5 * (from + to);

@@ -120,8 +120,7 @@ impl Gather {
         }
         let k = self.contour.primitives.len();
         if let Some(last) = self.contour.primitives.last() {
-            primitive.turn =
-                angle(&last.direction(self.contour.length_of(k - 1)), &primitive.direction(0.0));
+            primitive.turn = angle(&last.direction(self.contour.length_of(k - 1)), &primitive.direction(0.0));
         }
         self.contour.push(primitive, length);
         Ok(())

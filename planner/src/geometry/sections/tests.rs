@@ -78,7 +78,15 @@ impl Program {
     fn go(&mut self, kind: MoveKind, shape: Shape, end: Point) {
         let feed = if kind == MoveKind::Feed { self.feed } else { None };
         let line = self.items.len() as u32 + 1;
-        self.items.push(Item::Move(Move { kind, shape, start: self.at, end, feed, corner: self.corner, line }));
+        self.items.push(Item::Move(Move {
+            kind,
+            shape,
+            start: self.at,
+            end,
+            feed,
+            corner: self.corner,
+            line,
+        }));
         self.at = end;
     }
 
@@ -314,7 +322,9 @@ fn corners_are_rounded_within_the_tolerance_and_use_it() {
 fn arcs_and_helices_in_every_plane() {
     for plane in [[0, 1], [2, 0], [1, 2]] {
         let mut p = Program::new(&[1.0, 2.0, 3.0], FINE);
-        p.arc(plane, 10.0, 0.3, 2.0, 0.0).arc(plane, 3.0, 2.3, -3.0 * TAU, 5.0).arc(plane, 0.5, 1.0, PI, -1.0);
+        p.arc(plane, 10.0, 0.3, 2.0, 0.0)
+            .arc(plane, 3.0, 2.3, -3.0 * TAU, 5.0)
+            .arc(plane, 0.5, 1.0, PI, -1.0);
         examine(&p, &mill());
     }
 }
