@@ -74,3 +74,7 @@ pub const LSB_RATIO: f64 = 1e-12;
 /// A span's duration keeps this share away from the shortest and longest that drives accept: they compute it in
 /// f32.
 pub const FORMAT_MARGIN: f64 = 1e-6;
+
+/// A move also has to be below this share of a drive count to count as zero: far from the origin
+/// [`ZERO_LENGTH`] alone would swallow counts.
+pub const ZERO_COUNT: f64 = 1e-3;

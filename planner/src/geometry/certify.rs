@@ -186,7 +186,9 @@ fn piece_within(
     if size(&d[0]) > allowed || size(&d[3]) > allowed {
         return false;
     }
-    if size(&d[1]).max(size(&d[2])) + remainder <= allowed && size(&d[0]).max(size(&d[3])) + remainder <= allowed {
+    if size(&d[1]).max(size(&d[2])) + remainder <= allowed
+        && size(&d[0]).max(size(&d[3])) + remainder <= allowed
+    {
         return true;
     }
     let middle = 0.5 * (from + to);
@@ -195,28 +197,29 @@ fn piece_within(
         && piece_within(curve, p, origin, [middle, to], metric, allowed, depth - 1)
 }
 
-/// Upper bound of the distance on [from, to], within a per cent of the truth where it is above `floor`.
+/// Upper bound of the distance on [from, to]: at most `floor`, or within a per cent of the truth and, if that can
+/// be proven, at most `allowed`.
 fn piece_bound(
     curve: &SpanCurve,
     p: &Primitive,
     origin: f64,
     [from, to]: [f64; 2],
     metric: &Metric,
-    floor: f64,
+    [floor, allowed]: [f64; 2],
     depth: u32,
 ) -> f64 {
     let (d, remainder) = curve.difference(from, to, p, origin);
     let size = |v: &Point| metric.size(v, p.tolerance);
     let attained = size(&d[0]).max(size(&d[3]));
     let bound = attained.max(size(&d[1])).max(size(&d[2])) + remainder;
-    let negligible = DEVIATION_TIGHTNESS * 0.1 * p.tolerance;
-    if depth == 0 || bound <= floor.max(negligible).max(attained * (1.0 + DEVIATION_TIGHTNESS)) {
+    let enough = floor.max(attained * (1.0 + DEVIATION_TIGHTNESS)).min(allowed);
+    if depth == 0 || bound <= enough {
         return bound;
     }
     let middle = 0.5 * (from + to);
     let floor = floor.max(attained);
-    let left = piece_bound(curve, p, origin, [from, middle], metric, floor, depth - 1);
-    left.max(piece_bound(curve, p, origin, [middle, to], metric, floor.max(left), depth - 1))
+    let left = piece_bound(curve, p, origin, [from, middle], metric, [floor, allowed], depth - 1);
+    left.max(piece_bound(curve, p, origin, [middle, to], metric, [floor.max(left), allowed], depth - 1))
 }
 
 /// What the certificate says.
@@ -259,9 +262,11 @@ pub(super) fn certify(path: &GridPath, contour: &Contour, metric: &Metric) -> Ce
             let (from, to) = overlap(&curve, contour, k);
             let rounding = DEVIATION_ROUNDING * b[0].iter().fold(length, |m, v| m.max(v.abs()));
             let fixed = p.slack + p.shift + rounding * metric.rotary_scale(p.tolerance).max(1.0);
-            let floor = (deviation.bound_mm - fixed).min(p.tolerance - fixed).max(0.0);
-            let bound =
-                fixed + piece_bound(&curve, p, contour.start_of(k), [from, to], metric, floor, DEPTH);
+            let allowed = p.tolerance - fixed;
+            // Below a thousandth of the tolerance nobody cares how tight the bound is.
+            let floor = (deviation.bound_mm - fixed).max(0.1 * DEVIATION_TIGHTNESS * p.tolerance);
+            let goal = [floor, allowed];
+            let bound = fixed + piece_bound(&curve, p, contour.start_of(k), [from, to], metric, goal, DEPTH);
             holds &= bound <= p.tolerance;
             if bound > deviation.bound_mm {
                 (deviation.bound_mm, deviation.line) = (bound, p.line);

@@ -7,6 +7,11 @@ use super::certify::Metric;
 use crate::job::machine::{MAX_AXES, Point};
 use crate::job::program::{Arc, Feed};
 
+/// A joint is a corner if min(L) sin(theta/2) exceeds this many tolerances. A sagitta of min(L) theta / 8 above
+/// the tolerance already tells a corner from a sample of a curve; below this limit, though, a pair of knots at the
+/// vertex has to be shorter than the tolerance allows, and knots placed by the error alone give faster paths.
+const CORNER_LEG: f64 = 16.0;
+
 /// One line, arc or helix; u is the contour parameter, x = u - (u where it starts).
 ///
 /// Position = `start + slope x`, plus the circular part if there is one.
@@ -66,10 +71,29 @@ impl Round {
 
 impl Primitive {
     /// The straight primitive from `start` to `end`, with its length.
-    pub(super) fn line(start: &Point, end: &Point, tolerance: f64, feed: Option<Feed>, line: u32) -> (Self, f64) {
+    pub(super) fn line(
+        start: &Point,
+        end: &Point,
+        tolerance: f64,
+        feed: Option<Feed>,
+        line: u32,
+    ) -> (Self, f64) {
         let length = distance(start, end);
         let slope = std::array::from_fn(|a| (end[a] - start[a]) / length);
-        (Self { start: *start, slope, round: None, tolerance, slack: 0.0, shift: 0.0, turn: 0.0, feed, line }, length)
+        (
+            Self {
+                start: *start,
+                slope,
+                round: None,
+                tolerance,
+                slack: 0.0,
+                shift: 0.0,
+                turn: 0.0,
+                feed,
+                line,
+            },
+            length,
+        )
     }
 
     /// The arc or helix from `start` to `end`, with its length. A mismatch between the end points and the circle
@@ -98,9 +122,25 @@ impl Primitive {
         let around = (arc.radius + 0.5 * arc.radius_change) * arc.sweep;
         let length = straight.hypot(around).hypot(arc.radius_change);
         let slope = std::array::from_fn(|i| (b[i] - a[i]) / length);
-        let round =
-            Round { radius_slope: unit.radius_slope / length, angle_slope: unit.angle_slope / length, ..unit };
-        (Self { start: a, slope, round: Some(round), tolerance, slack: 0.0, shift: 0.0, turn: 0.0, feed, line }, length)
+        let round = Round {
+            radius_slope: unit.radius_slope / length,
+            angle_slope: unit.angle_slope / length,
+            ..unit
+        };
+        (
+            Self {
+                start: a,
+                slope,
+                round: Some(round),
+                tolerance,
+                slack: 0.0,
+                shift: 0.0,
+                turn: 0.0,
+                feed,
+                line,
+            },
+            length,
+        )
     }
 
     /// Position at x.
@@ -199,14 +239,15 @@ impl Contour {
     }
 
     /// Whether joint `k` (start of primitive `k`) is a true corner: sharper than the tolerance can hide, with
-    /// both legs long enough that it is no sample of a curve (min(L) sin(theta/2) > 3 tol).
+    /// both legs long enough for a rounding of their own. Gives tol / sin(theta/2).
     pub(super) fn corner(&self, k: usize) -> Option<f64> {
         if k == 0 || k >= self.primitives.len() {
             return None;
         }
         let sine = (0.5 * self.primitives[k].turn).sin();
         let tolerance = self.primitives[k].tolerance.min(self.primitives[k - 1].tolerance);
-        (self.length_of(k).min(self.length_of(k - 1)) * sine > 3.0 * tolerance).then_some(tolerance / sine)
+        (self.length_of(k).min(self.length_of(k - 1)) * sine > CORNER_LEG * tolerance)
+            .then_some(tolerance / sine)
     }
 
     /// Cuts the contour in two at the start of primitive `k`.

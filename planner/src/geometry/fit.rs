@@ -50,9 +50,6 @@ const MOST_SPANS: usize = 1 << 24;
 /// Most grid steps of one section: multiples of the step stay exact.
 const MOST_STEPS: u64 = 1 << 52;
 
-/// Shift of the control point at a corner, in quasi-interpolant corrections: 0.4 h sin(theta/2) outwards.
-const SWING_WIDE: f64 = 1.2;
-
 /// Fits a spline to a contour whose length is a whole number of grid steps.
 pub(super) fn fit(contour: &Contour, demand: &Demand<'_>) -> Result<Spline, Unfit> {
     let knots = Knots::coarse(contour, demand.step, demand.longest);
@@ -163,11 +160,11 @@ impl<'a> Fitter<'a> {
             return k;
         }
         let (before, after) = (at - n, at + n);
-        let lambda = if self.knots.corner[i - 1] { SWING_WIDE } else { 1.0 };
         for a in 0..n {
             let f = self.samples[at + a];
-            let slopes = [(f - self.samples[before + a]) / (u - ul), (self.samples[after + a] - f) / (ur - u)];
-            self.controls[at + a] -= lambda * spread * 2.0 * (slopes[1] - slopes[0]) / (ur - ul);
+            let slopes =
+                [(f - self.samples[before + a]) / (u - ul), (self.samples[after + a] - f) / (ur - u)];
+            self.controls[at + a] -= 2.0 * spread * (slopes[1] - slopes[0]) / (ur - ul);
         }
         k
     }
@@ -252,7 +249,13 @@ impl<'a> Fitter<'a> {
     }
 
     /// A span on which the path nearly stands still: follow the contour more closely, or stop.
-    fn judge_slow(&self, j: usize, first: usize, curve: &SpanCurve, can_be_plain: bool) -> Result<Verdict, Unfit> {
+    fn judge_slow(
+        &self,
+        j: usize,
+        first: usize,
+        curve: &SpanCurve,
+        can_be_plain: bool,
+    ) -> Result<Verdict, Unfit> {
         let (sharpest, turn, tolerance) = self.sharpest_joint(j, first);
         let wanted = SLOW_PARAMETER.min(0.6 * (0.5 * turn).cos());
         let slowest = slowest(curve);

@@ -5,7 +5,7 @@ use super::contour::{Contour, Primitive, angle, distance};
 use super::sections::{GeometryError, PathSettings};
 use crate::job::machine::Point;
 use crate::job::program::{Corner, Feed, Move, MoveKind, Shape, StopCause};
-use crate::tolerances::{CONTOUR_GAP, ZERO_LENGTH};
+use crate::tolerances::{CONTOUR_GAP, ZERO_COUNT, ZERO_LENGTH};
 
 /// Turning further than this is a reversal [rad].
 const REVERSAL: f64 = 170.0 * std::f64::consts::PI / 180.0;
@@ -57,7 +57,7 @@ impl Gather {
     /// Why motion has to rest before `next`, if it has to.
     pub(super) fn joint(&self, next: &Move, settings: &PathSettings, metric: &Metric) -> Option<StopCause> {
         let kind = self.kind?;
-        if self.zero_length(next) {
+        if self.zero_length(next, metric) {
             return None;
         }
         if kind == MoveKind::Rapid || next.kind == MoveKind::Rapid {
@@ -95,7 +95,7 @@ impl Gather {
                 return Err(GeometryError::Gap { line: next.line });
             }
         }
-        if self.zero_length(next) {
+        if self.zero_length(next, metric) {
             // Its place in the program may still demand a rest.
             if next.corner == Corner::Stop && self.kind.is_some() {
                 self.corner = Some(Corner::Stop);
@@ -120,8 +120,7 @@ impl Gather {
         }
         let k = self.contour.primitives.len();
         if let Some(last) = self.contour.primitives.last() {
-            primitive.turn =
-                angle(&last.direction(self.contour.length_of(k - 1)), &primitive.direction(0.0));
+            primitive.turn = angle(&last.direction(self.contour.length_of(k - 1)), &primitive.direction(0.0));
         }
         self.contour.push(primitive, length);
         Ok(())
@@ -137,14 +136,15 @@ impl Gather {
         self.tail.as_ref().map(|t| t.start).or_else(|| self.contour.last()).unwrap_or(next.start)
     }
 
-    fn zero_length(&self, next: &Move) -> bool {
+    /// Whether `next` goes nowhere: nothing against the coordinates, and nothing against a drive count.
+    fn zero_length(&self, next: &Move, metric: &Metric) -> bool {
         let size = next.start.iter().chain(&next.end).fold(0.0f64, |m, v| m.max(v.abs()));
         let around = match next.shape {
             Shape::Line => 0.0,
             Shape::Arc(arc) => arc.radius * arc.sweep.abs(),
         };
         let start = self.end().unwrap_or(next.start);
-        distance(&start, &next.end).max(around) <= ZERO_LENGTH * size.max(f64::MIN_POSITIVE)
+        distance(&start, &next.end).max(around) <= (ZERO_LENGTH * size).min(ZERO_COUNT * metric.tightest())
     }
 
     /// The primitive of `next`, from the last kept point if it is a line that goes on from there.

@@ -8,9 +8,9 @@ const GRADING: f64 = 2.2;
 /// The two spans at a corner differ by this factor at most; halving the longer one never overshoots it.
 const SYMMETRY: f64 = 1.6;
 
-/// Half width of the first pair of spans at a corner, in tol / sin(theta/2). A control point 0.4 h sin(theta/2)
-/// outside the vertex leaves equal errors on both sides at 15.
-const CORNER_REACH: f64 = 14.0;
+/// Length of the first pair of spans at a corner, in tol / sin(theta/2). The quasi-interpolant puts its control
+/// point h/3 sin(theta/2) outside the vertex and swings wide: the longest that stays within the tolerance.
+const CORNER_REACH: f64 = 16.0;
 
 /// Knots of a spline in the making [grid steps].
 #[derive(Clone, Debug, PartialEq)]

@@ -300,7 +300,11 @@ impl<I> Sections<I> {
     fn to_counts(&self, p: &Point, line: u32) -> Result<Vec<i64>, GeometryError> {
         let counts = self.machine.axes.iter().zip(p).map(|(axis, x)| (x * axis.counts_per_unit).round());
         counts
-            .map(|c| if c.abs() < LARGEST_CONTROL { Ok(c as i64) } else { Err(GeometryError::TooFar { line }) })
+            .map(
+                |c| {
+                    if c.abs() < LARGEST_CONTROL { Ok(c as i64) } else { Err(GeometryError::TooFar { line }) }
+                },
+            )
             .collect()
     }
 
@@ -375,3 +379,6 @@ where
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
