@@ -43,7 +43,7 @@ fn pairs(c: &Certificate, s: &Ratios) -> [(f64, f64); 4] {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn bounds_are_never_below_the_samples_and_at_most_a_hundredth_above(

@@ -156,8 +156,7 @@ impl Open {
         s.last_line = cell.line;
         s.seconds += cell.seconds;
         s.lowest = if cell.rests { 0.0 } else { s.lowest.min(ratio * s.programmed) };
-        // The speed hardly changes over a cell, except where motion begins and ends.
-        let covered = if cell.rests { mean_rest_ratio(cell, ratio) } else { ratio } * cell.seconds;
+        let covered = mean_ratio(cell, ratio) * cell.seconds;
         self.covered += covered;
         s.lost_s += cell.seconds - covered;
         let binding = if cell.rests { Binding::Rest } else { cell.nearest_limit(&section.limits).0 };
@@ -173,11 +172,71 @@ impl Open {
     }
 }
 
-/// Mean over time of the feed ratio on a cell of a rest span: length / time against the speed in the middle.
-fn mean_rest_ratio(cell: &Cell<'_>, ratio: f64) -> f64 {
+/// Mean over time of the feed ratio on a cell: its length / time against du/dt in the middle.
+fn mean_ratio(cell: &Cell<'_>, ratio: f64) -> f64 {
     if cell.seconds > 0.0 && cell.path.speed > 0.0 {
         ratio * (cell.range[1] - cell.range[0]) / (cell.seconds * cell.path.speed)
     } else {
         0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::samples::{back_section, bent_section};
+    use crate::geometry::section::FeedCap;
+
+    fn capped(rate: f64) -> PlannedSection {
+        let mut section = bent_section();
+        section.marks.caps[0].speed = SpeedCap::Rate(rate);
+        section
+    }
+
+    #[test]
+    fn a_feed_that_is_never_reached_is_one_stretch() {
+        let section = capped(25.0);
+        let mut found = Shortfalls::new(10);
+        found.add(&section);
+        let duration = section.table.duration();
+        assert_eq!((found.count, found.at_feed_s), (1, 0.0));
+        assert!((found.feed_s / duration - 1.0).abs() < 1e-9);
+        let worst = found.worst();
+        let s = &worst[0];
+        assert_eq!((s.first_line, s.last_line, s.from, s.to), (4, 5, 0.0, 10.0));
+        assert!((s.lost_s / (duration - 10.0 / 25.0) - 1.0).abs() < 1e-9, "{s:?}");
+        assert!((s.mean / (10.0 / duration) - 1.0).abs() < 1e-9, "{s:?}");
+        assert_eq!((s.lowest, s.programmed), (0.0, 25.0));
+    }
+
+    #[test]
+    fn only_the_slow_ends_count_when_the_middle_is_fast_enough() {
+        let mut found = Shortfalls::new(1);
+        found.add(&capped(5.0));
+        assert_eq!(found.count, 2);
+        assert!(found.at_feed_s > 0.0 && found.at_feed_s < found.feed_s);
+        let lost = found.lost_s;
+        let worst = found.worst();
+        assert_eq!(worst.len(), 1);
+        let s = &worst[0];
+        assert!(s.lost_s >= 0.5 * lost && s.lost_s < lost);
+        assert!((s.from == 0.0) != (s.to == 10.0), "{s:?}");
+        assert_eq!((s.limited_by, s.axis), ("rest", None));
+    }
+
+    #[test]
+    fn a_new_feed_starts_a_new_stretch_and_rapids_count_none() {
+        let mut section = capped(30.0);
+        section.marks.caps.insert(0, FeedCap { until: 325, speed: SpeedCap::Rate(25.0) });
+        let mut rapid = back_section();
+        rapid.kind = MoveKind::Rapid;
+        let mut found = Shortfalls::new(10);
+        found.add(&rapid);
+        found.add(&section);
+        let worst = found.worst();
+        assert_eq!(worst.len(), 2);
+        assert!(worst.iter().all(|s| s.section == 1));
+        let cut = 325.0 / 64.0;
+        assert!(worst.iter().any(|s| s.to == cut) && worst.iter().any(|s| s.from == cut));
     }
 }
