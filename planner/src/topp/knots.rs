@@ -11,8 +11,10 @@ use crate::geometry::grid_path::GridPath;
 const GROWTH: f64 = 1.8;
 /// Longest span planned for [s]; a table span must stay below one second.
 const LONGEST_S: f64 = 0.4;
-/// Fewest spans of a short move: a move that is all jerk needs 32 for a loss below one per cent.
+/// Fewest spans of a short move, and of one too short to build up full acceleration: only with so many is its loss
+/// below one per cent.
 const FEWEST_SPANS: f64 = 32.0;
+const FEWEST_ALL_JERK: f64 = 64.0;
 /// Longest step of a table [grid steps].
 const LONGEST_STEP: f64 = (1u64 << 31) as f64;
 /// Inner spans next to a rest, and the cells each of them gets.
@@ -160,7 +162,9 @@ impl<'a> Estimate<'a> {
         for k in 1..u.len() {
             clock.push(clock[k - 1] + 2.0 * (u[k] - u[k - 1]) / (speed[k] + speed[k - 1]));
         }
-        let target = (ramp_s / settings.spans_per_ramp).min(clock[clock.len() - 1] / FEWEST_SPANS);
+        let total = clock[clock.len() - 1];
+        let fewest = if total < 4.0 * ramp_s { FEWEST_ALL_JERK } else { FEWEST_SPANS };
+        let target = (ramp_s / settings.spans_per_ramp).min(total / fewest);
         let idle = idle_time(&clock, &speed, u, problem, sweep);
         let allowed = |k: usize| (target + 0.4 * (idle[k] - 1.5 * ramp_s).max(0.0)).min(LONGEST_S);
         let graded = GROWTH.ln() / (GROWTH - 1.0);

@@ -24,6 +24,7 @@ pub use error::{LimitKind, PathFault, PlanError};
 
 use layout::{Derivatives, Layout, Pieces, strictest};
 use problem::{Plan, Problem, Settings, Solver};
+use crate::job::machine::AxisLimits;
 use rows::RowSource;
 use sweep::Sweep;
 
@@ -44,11 +45,19 @@ const CEILING: f64 = 1.1;
 pub fn plan(problem: &Problem, settings: &Settings) -> Result<Plan, PlanError> {
     error::validate(problem)?;
     validate_settings(settings)?;
+    let limits = slowed(problem);
+    let problem = &Problem { limits: &limits, ..*problem };
     let sweep = Sweep::new(problem);
     let mut layout = knots::place(problem, settings, &sweep)?;
     let mut iterations = 0;
     for _ in 0..MOST_REFINEMENTS {
         let plan = solve(problem, settings, &sweep, &layout, &mut iterations)?;
+        if std::env::var("DBG").is_ok() {
+            for i in 0..plan.table.spans() {
+                println!("{i} h {:.3e} {:?} T {:.3e} {:?}", layout.h[i], plan.table.law(i), plan.table.law(i).duration(), plan.binding[i]);
+            }
+            println!();
+        }
         let Some(parts) = check::format(&layout, &plan.table) else {
             return Ok(Plan { iterations, ..plan });
         };
@@ -63,6 +72,25 @@ pub fn plan(problem: &Problem, settings: &Settings) -> Result<Plan, PlanError> {
             Err(format_error(problem, &layout, &plan, span))
         }
     }
+}
+
+/// The limits, jerk lowered where a move would else be over in so few ticks that its spans could not last one each:
+/// rest to rest under jerk alone takes T with L = J T^3/32.
+fn slowed(problem: &Problem) -> Vec<AxisLimits> {
+    const FEWEST_TICKS: f64 = 8.0;
+    let shortest = FEWEST_TICKS * problem.shortest_span_s;
+    problem
+        .limits
+        .iter()
+        .zip(&problem.path.axes)
+        .map(|(l, axis)| {
+            let travel = axis.controls.windows(2).map(|c| c[1].abs_diff(c[0]) as f64).sum::<f64>() * axis.lsb;
+            let ruled = 32.0 * travel / shortest.powi(3);
+            // Where acceleration saturates under that jerk, the move takes longer anyway.
+            let rules = travel > 0.0 && ruled < l.jerk && 0.25 * shortest * ruled < l.acceleration;
+            AxisLimits { jerk: if rules { ruled } else { l.jerk }, ..*l }
+        })
+        .collect()
 }
 
 fn format_error(problem: &Problem, layout: &Layout, plan: &Plan, span: usize) -> PlanError {
