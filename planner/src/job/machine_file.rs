@@ -226,7 +226,8 @@ impl MachineForm {
             if tools.iter().any(|t| t.number == number) {
                 return Err((tool.number.span(), Kind::ToolTwice { number }));
             }
-            let length_mm = within(&tool.length_mm, "length_mm", -1e4, 1e4, "a length from -10000 to 10000 mm")?;
+            let length_mm =
+                within(&tool.length_mm, "length_mm", -1e4, 1e4, "a length from -10000 to 10000 mm")?;
             tools.push(Tool { number, length_mm });
         }
         let stem = || Path::new(file_name).file_stem().map(|s| s.to_string_lossy().into_owned());
@@ -234,7 +235,11 @@ impl MachineForm {
             name: self.name.or_else(stem).unwrap_or_else(|| file_name.to_owned()),
             control_tick_s: tick_s,
             tolerance_mm: positive_or(self.tolerance_mm.as_ref(), "tolerance_mm", 0.01)?,
-            tolerance_rotary: positive_or(self.tolerance_rotary.as_ref(), "tolerance_rotary", rotary_default)?,
+            tolerance_rotary: positive_or(
+                self.tolerance_rotary.as_ref(),
+                "tolerance_rotary",
+                rotary_default,
+            )?,
             best_speed_mm: positive_or(self.best_speed_mm.as_ref(), "best_speed_mm", 0.05)?,
             exact_path_mm: positive_or(self.exact_path_mm.as_ref(), "exact_path_mm", 0.001)?,
             corner: match self.corner.unwrap_or(CornerForm::Blend) {

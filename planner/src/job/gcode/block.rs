@@ -280,9 +280,7 @@ impl Block {
             return Err(printer.fault(ErrorKind::PrinterCodeShares { code: printer.code }));
         }
         match &mut self.codes[group as usize] {
-            Some(first) => {
-                Err(word.fault(ErrorKind::ModalConflict { first: first.code, second: word.code }))
-            }
+            Some(first) => Err(word.fault(ErrorKind::ModalConflict { first: first.code, second: word.code })),
             free => {
                 *free = Some(word);
                 Ok(end)

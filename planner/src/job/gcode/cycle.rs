@@ -100,7 +100,9 @@ impl<R: BufRead> Program<R> {
         }
         self.modal.sticky = sticky;
         let (Some(bottom), true) = (sticky.bottom, moves || deepens) else {
-            return Err(self.missing(code, if sticky.bottom.is_none() { normal_letter } else { plane_letters[0] }));
+            return Err(
+                self.missing(code, if sticky.bottom.is_none() { normal_letter } else { plane_letters[0] })
+            );
         };
         let Some(retract) = sticky.retract else { return Err(self.missing(code, b'R')) };
         let repeats = self.whole_number(b'L', 1, REPEAT_LIMIT)?.unwrap_or(1);

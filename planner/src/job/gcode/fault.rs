@@ -197,7 +197,9 @@ impl ErrorKind {
                 "expected words of a letter and a number, and comments in ( ) or after ;".into()
             }
             K::MissingNumber { letter } => format!("expected a number after the letter, such as {letter}1.5"),
-            K::MalformedNumber { .. } => "expected digits with at most one sign and one point, such as -0.25".into(),
+            K::MalformedNumber { .. } => {
+                "expected digits with at most one sign and one point, such as -0.25".into()
+            }
             K::UnclosedComment => "close the comment with ) on the same line".into(),
             K::NestedComment => "use one pair of parentheses per comment".into(),
             K::Parameter | K::Expression => {
@@ -212,7 +214,7 @@ impl ErrorKind {
             K::PrinterCode { .. } => "use --dialect printer to skip printer codes".into(),
             K::UnknownCode { .. } => "expected a code such as G1, G54 or G59.1".into(),
             K::UnknownWord { letter: 'E' } => "use --dialect printer to skip extruder words".into(),
-            K::UnknownWord { letter: 'D' } => {
+            K::UnusedWord { letter: 'D' } => {
                 "cutter compensation is not supported: have the CAM system compensate for the tool".into()
             }
             K::UnknownWord { .. } | K::UnusedWord { .. } => {
@@ -225,7 +227,9 @@ impl ErrorKind {
             K::NotInteger { .. } => "expected a whole number".into(),
             K::OutOfRange { min, max, .. } => format!("expected a number from {min} to {max}"),
             K::MissingWord { letter, .. } => format!("add {letter} to the block"),
-            K::NoFeed | K::ZeroFeed => "set F above zero before the first G1, G2 or G3, or use --ignore-feed".into(),
+            K::NoFeed | K::ZeroFeed => {
+                "set F above zero before the first G1, G2 or G3, or use --ignore-feed".into()
+            }
             K::NoInverseTime => "add F (1 / minutes that the block takes), or change to G94".into(),
             K::OutsideTravel { .. } => {
                 "positions are machine positions (offsets included): check units (G20, G21), offsets and the \
@@ -249,7 +253,9 @@ impl ErrorKind {
                 format!("add [[tool]] with number = {number} and length_mm to the machine file")
             }
             K::CycleUpwards { .. } => "expected Z below R".into(),
-            K::CycleAxis { .. } => "expected only X, Y and Z words; move the other axes in their own block".into(),
+            K::CycleAxis { .. } => {
+                "expected only X, Y and Z words; move the other axes in their own block".into()
+            }
             K::CycleInverseTime => "change to G94 before the cycle".into(),
             K::TooManyPecks { most, .. } => format!("expected at most {most} pecks: choose a larger Q"),
             K::PrinterCodeShares { .. } => "write the code in a line of its own".into(),

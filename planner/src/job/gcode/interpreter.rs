@@ -250,16 +250,16 @@ impl<R: BufRead> Program<R> {
             self.modal.unit_said = true;
         }
         if let Some(value) = self.not_negative(b'F')? {
-            self.modal.feed = (!self.modal.inverse_time).then_some(FeedRate {
-                mm_per_s: value * self.modal.unit_mm / 60.0,
-                deg_per_s: value / 60.0,
-            });
+            self.modal.feed = (!self.modal.inverse_time)
+                .then_some(FeedRate { mm_per_s: value * self.modal.unit_mm / 60.0, deg_per_s: value / 60.0 });
         }
         Ok(())
     }
 
     fn set_tool_and_spindle(&mut self) -> Result<(), Fault> {
-        let speed = self.not_negative(b'S')?;
+        // S of a printer's dwell is a time.
+        let dwells = self.options.dialect == Dialect::Printer && self.code(Group::NonModal, &[40]).is_some();
+        let speed = if dwells { None } else { self.not_negative(b'S')? };
         let changed = speed.is_some_and(|s| s != self.modal.spindle_speed);
         if let Some(speed) = speed {
             self.modal.spindle_speed = speed;
@@ -355,7 +355,9 @@ impl<R: BufRead> Program<R> {
                         let tolerance_mm = self.best_speed_mm;
                         self.note_once(
                             Once::BestSpeed,
-                            &format!("G64 without P: {tolerance_mm} mm is used (best_speed_mm of the machine)"),
+                            &format!(
+                                "G64 without P: {tolerance_mm} mm is used (best_speed_mm of the machine)"
+                            ),
                         );
                         Corner::Within { tolerance_mm, source: ToleranceSource::BestSpeed }
                     }
@@ -370,10 +372,9 @@ impl<R: BufRead> Program<R> {
         let Some(word) = self.block.code(Group::NonModal) else { return Ok(()) };
         let tenths = word.code.tenths();
         let takes_axes = matches!(tenths, 100 | 280 | 300 | 920);
-        if let Some(motion) = self.block.code(Group::Motion).filter(|m| takes_axes && m.code != Code::g(800)) {
-            return Err(
-                motion.fault(ErrorKind::AxisWordConflict { first: word.code, second: motion.code })
-            );
+        if let Some(motion) = self.block.code(Group::Motion).filter(|m| takes_axes && m.code != Code::g(800))
+        {
+            return Err(motion.fault(ErrorKind::AxisWordConflict { first: word.code, second: motion.code }));
         }
         let before = self.modal.offsets.all();
         match tenths {

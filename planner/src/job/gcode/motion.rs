@@ -245,7 +245,9 @@ impl<R: BufRead> Program<R> {
         if !self.modal.unit_said {
             self.note_once(Once::Units, "no G20 or G21: millimetres are assumed");
         }
-        if !self.cutting && let Some((text, line)) = self.notes.take_operation() {
+        if !self.cutting
+            && let Some((text, line)) = self.notes.take_operation()
+        {
             self.queue.push_back(Item::Note { text, line });
         }
         let exact = self.block.code(Group::ExactStop).is_some();

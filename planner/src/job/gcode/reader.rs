@@ -45,7 +45,9 @@ impl<R: BufRead> LineReader<R> {
             return Err(ErrorKind::Binary { byte: 0 }.at(at as u32, 1));
         }
         if self.text().len() > LINE_LIMIT_BYTES {
-            return Err(ErrorKind::LineTooLong { limit_bytes: LINE_LIMIT_BYTES }.at(LINE_LIMIT_BYTES as u32, 1));
+            return Err(
+                ErrorKind::LineTooLong { limit_bytes: LINE_LIMIT_BYTES }.at(LINE_LIMIT_BYTES as u32, 1)
+            );
         }
         Ok(true)
     }

@@ -4,9 +4,9 @@
 //! field is not checked) and `refused.csv` with lines `file,line`; `.gz` files are unpacked by gzip.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Cursor};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::Instant;
 
 use super::mill;
@@ -29,8 +29,9 @@ fn rows(path: &Path) -> Vec<Vec<String>> {
 
 fn open(path: &Path) -> Box<dyn BufRead> {
     if path.extension().is_some_and(|e| e == "gz") {
-        let child = Command::new("gzip").arg("-dc").arg(path).stdout(Stdio::piped()).spawn().unwrap();
-        Box::new(BufReader::with_capacity(1 << 16, child.stdout.unwrap()))
+        let unpacked = Command::new("gzip").arg("-dc").arg(path).output().unwrap();
+        assert!(unpacked.status.success(), "gzip cannot unpack {}", path.display());
+        Box::new(Cursor::new(unpacked.stdout))
     } else {
         Box::new(BufReader::with_capacity(1 << 16, File::open(path).unwrap()))
     }
@@ -41,8 +42,9 @@ fn figures_agree_with_the_reference() {
     let Some(folder) = folder() else { return };
     for row in rows(&folder.join("reference.csv")) {
         let path = folder.join(&row[0]);
+        let reader = open(&path);
         let clock = Instant::now();
-        let mut program = Program::new(open(&path), &row[0], &mill(), Options::default());
+        let mut program = Program::new(reader, &row[0], &mill(), Options::default());
         let mut last_end = [0.0; 9];
         for item in &mut program {
             if let Item::Move(step) = item.unwrap_or_else(|e| panic!("{e}")) {
@@ -52,11 +54,7 @@ fn figures_agree_with_the_reference() {
         }
         let elapsed = clock.elapsed();
         let c = program.counters();
-        eprintln!(
-            "{}: {c:?} {:.0} ns/block",
-            row[0],
-            elapsed.as_nanos() as f64 / c.blocks.max(1) as f64
-        );
+        eprintln!("{}: {c:?} {:.0} ns/block", row[0], elapsed.as_nanos() as f64 / c.blocks.max(1) as f64);
         let found = [c.lines as f64, c.arcs as f64, c.feed_length_mm, c.rapid_length_mm];
         for ((field, found), relative) in row[1..].iter().zip(found).zip([0.0, 0.0, 1e-4, 1e-4]) {
             if field.is_empty() {
