@@ -122,6 +122,20 @@ fn setpoints_do_not_depend_on_which_instants_were_asked_before() {
 }
 
 #[test]
+fn a_table_takes_as_long_as_the_law_says() {
+    let mut random = Random::new(7);
+    let mut worst = 0f64;
+    for _ in 0..200 {
+        let sample = Sample::new(&mut random, FINE);
+        let packed = sample.packed(1).unwrap();
+        let seconds = checked(&packed, 0).duration() as f64 / UNIT;
+        worst = worst.max((seconds / sample.table.duration() - 1.0).abs());
+    }
+    assert!(worst < 1e-6, "{worst:e}");
+    println!("{worst:e}");
+}
+
+#[test]
 fn all_axes_pass_every_knot_at_the_same_time() {
     let mut random = Random::new(5);
     for _ in 0..100 {
