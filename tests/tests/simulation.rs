@@ -1,4 +1,5 @@
 //! Jobs played to their end by the drive core on the simulated bus, with servos and plants behind it.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
 use std::f64::consts::PI;
 

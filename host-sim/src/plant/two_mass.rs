@@ -23,7 +23,7 @@ const HALVINGS: u32 = 40;
 const REVERSALS: u32 = 4;
 
 /// The state that the linear equations act on.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct State {
     /// Way of the motor since the step began.
     travelled: f64,
@@ -49,7 +49,13 @@ pub(super) struct ElasticPair {
     damper: f64,
     substeps: u32,
     substep_s: f64,
+    /// The flow over a whole substep, motor held and motor free.
+    whole: [Transition; 2],
 }
+
+/// What a substep makes of a unit of velocity, twist, slip and input.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Transition([State; 4]);
 
 impl ElasticPair {
     /// `None` when the coupling would need more than [`MAX_SUBSTEPS`].
@@ -64,9 +70,9 @@ impl ElasticPair {
             return None;
         }
         let substeps = (needed as u32).max(MIN_SUBSTEPS);
-        Some(Self {
+        let mut pair = Self {
             position,
-            state: State { travelled: 0.0, velocity: 0.0, twist: 0.0, slip: 0.0 },
+            state: State::default(),
             inverse_motor: 1.0 / motor,
             inverse_load: 1.0 / load,
             viscous: plant.viscous,
@@ -75,7 +81,23 @@ impl ElasticPair {
             damper: 2.0 * two.damping * omega * reduced,
             substeps,
             substep_s: tick_s / f64::from(substeps),
-        })
+            whole: [Transition::default(); 2],
+        };
+        pair.whole = [pair.transition(None), pair.transition(Some(0.0))];
+        Some(pair)
+    }
+
+    /// The flow over a whole substep, `free` as the input of [`Self::flow`].
+    fn transition(&self, free: Option<f64>) -> Transition {
+        let zero = State::default();
+        let over = |from: State| self.flow(&from, free, self.substep_s);
+        let input = if free.is_some() { self.flow(&zero, Some(1.0), self.substep_s) } else { zero };
+        Transition([
+            over(State { velocity: 1.0, ..zero }),
+            over(State { twist: 1.0, ..zero }),
+            over(State { slip: 1.0, ..zero }),
+            input,
+        ])
     }
 
     pub(super) fn advance(&mut self, effort: f64) {
@@ -93,7 +115,12 @@ impl ElasticPair {
         let mut state = State { travelled: 0.0, ..self.state };
         for _ in 0..REVERSALS {
             let direction = slip_direction(state.velocity, effort - self.shaft(&state), self.coulomb);
-            let end = self.flow(&state, effort, direction, left);
+            let input = direction.map(|d| effort - self.coulomb * d);
+            let end = if left == self.substep_s {
+                self.whole[usize::from(input.is_some())].apply(&state, input.unwrap_or(0.0))
+            } else {
+                self.flow(&state, input, left)
+            };
             let reversed = self.coulomb > 0.0 && direction.is_some_and(|d| end.velocity * d < 0.0);
             if !reversed {
                 state = end;
@@ -102,14 +129,14 @@ impl ElasticPair {
             let (mut early, mut late) = (0.0, left);
             for _ in 0..HALVINGS {
                 let middle = 0.5 * (early + late);
-                let there = self.flow(&state, effort, direction, middle);
+                let there = self.flow(&state, input, middle);
                 if direction.is_some_and(|d| there.velocity * d < 0.0) {
                     late = middle
                 } else {
                     early = middle
                 }
             }
-            state = self.flow(&state, effort, direction, early);
+            state = self.flow(&state, input, early);
             // The load keeps its own velocity while the motor's is set to the zero it has reached.
             state.slip -= state.velocity;
             state.velocity = 0.0;
@@ -119,21 +146,16 @@ impl ElasticPair {
         self.state = state;
     }
 
-    /// The state after `t`, friction acting along `direction`, or the motor held when `None`: Taylor series of
-    /// the exact solution.
-    fn flow(&self, from: &State, effort: f64, direction: Option<f64>, t: f64) -> State {
+    /// The state after `t` under `input`, effort less friction, or with the motor held when `None`: Taylor series
+    /// of the exact solution.
+    fn flow(&self, from: &State, input: Option<f64>, t: f64) -> State {
         let mut sum = *from;
         let mut term = *from;
         for k in 1..=TAYLOR_TERMS {
-            let input = match direction {
-                Some(d) if k == 1 => effort - self.coulomb * d,
-                _ => 0.0,
-            };
-            term = self.derivative(&term, input, direction.is_some()).scaled(t / f64::from(k));
-            sum.travelled += term.travelled;
-            sum.velocity += term.velocity;
-            sum.twist += term.twist;
-            sum.slip += term.slip;
+            // A constant input drives the first derivative only.
+            let driven = if k == 1 { input.unwrap_or(0.0) } else { 0.0 };
+            term = State::default().plus(&self.derivative(&term, driven, input.is_some()), t / f64::from(k));
+            sum = sum.plus(&term, 1.0);
         }
         sum
     }
@@ -152,12 +174,25 @@ impl ElasticPair {
 }
 
 impl State {
-    fn scaled(self, f: f64) -> Self {
+    /// This state and `factor` times another.
+    fn plus(self, other: &Self, factor: f64) -> Self {
         Self {
-            travelled: self.travelled * f,
-            velocity: self.velocity * f,
-            twist: self.twist * f,
-            slip: self.slip * f,
+            travelled: self.travelled + factor * other.travelled,
+            velocity: self.velocity + factor * other.velocity,
+            twist: self.twist + factor * other.twist,
+            slip: self.slip + factor * other.slip,
         }
+    }
+}
+
+impl Transition {
+    /// The state after the substep; what was travelled is counted from its start.
+    fn apply(&self, from: &State, input: f64) -> State {
+        let [velocity, twist, slip, driven] = &self.0;
+        State::default()
+            .plus(velocity, from.velocity)
+            .plus(twist, from.twist)
+            .plus(slip, from.slip)
+            .plus(driven, input)
     }
 }
