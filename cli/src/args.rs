@@ -211,7 +211,9 @@ mod tests {
             (args.limits, args.dialect, args.solver),
             (Limits::Vaj, Dialect::Rs274, Solver::InteriorPoint)
         );
-        assert!(args.machine.is_none() && args.out.is_none() && args.tolerance.is_none() && !args.ignore_feed);
+        assert!(
+            args.machine.is_none() && args.out.is_none() && args.tolerance.is_none() && !args.ignore_feed
+        );
     }
 
     #[test]
@@ -222,7 +224,10 @@ mod tests {
         assert_eq!(args.machine, Some("m.toml".into()));
         assert_eq!(args.out, Some("d".into()));
         assert_eq!(args.tolerance, Some(0.02));
-        assert_eq!((args.limits, args.dialect, args.solver), (Limits::Va, Dialect::Printer, Solver::Clarabel));
+        assert_eq!(
+            (args.limits, args.dialect, args.solver),
+            (Limits::Va, Dialect::Printer, Solver::Clarabel)
+        );
         assert_eq!(args.threads, Some(3));
         assert!(args.ignore_feed && args.speech.json && args.speech.quiet);
     }

@@ -54,7 +54,11 @@ impl<'a> Console<'a> {
             GraphicalTheme::unicode_nocolor()
         };
         let mut text = String::new();
-        if GraphicalReportHandler::new_themed(theme).with_width(100).render_report(&mut text, failure).is_err() {
+        if GraphicalReportHandler::new_themed(theme)
+            .with_width(100)
+            .render_report(&mut text, failure)
+            .is_err()
+        {
             text = format!("error: {failure}\n");
         }
         let _ = write!(self.err, "{text}");

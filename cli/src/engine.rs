@@ -32,12 +32,8 @@ pub trait Engine {
     ///
     /// # Errors
     /// As [`Engine::plan`], or a drive refuses the table, or `trace` cannot be written.
-    fn run(
-        &self,
-        args: &RunArgs,
-        trace: &mut dyn Write,
-        progress: &mut Progress,
-    ) -> Result<Outcome, Failure>;
+    fn run(&self, args: &RunArgs, trace: &mut dyn Write, progress: &mut Progress)
+    -> Result<Outcome, Failure>;
 
     /// Proves a feed table file against the limits it carries.
     ///

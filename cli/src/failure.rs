@@ -3,7 +3,9 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use miette::{Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
+use miette::{
+    Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents,
+};
 
 use crate::{EXIT_BAD_INPUT, EXIT_FAILED};
 
@@ -54,7 +56,10 @@ impl Place {
         let from = at.saturating_sub(QUOTE / 2);
         let until = (from + QUOTE).min(text.len());
         let show = |bytes: &[u8]| -> String {
-            String::from_utf8_lossy(bytes).chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+            String::from_utf8_lossy(bytes)
+                .chars()
+                .map(|c| if c.is_control() { '\u{fffd}' } else { c })
+                .collect()
         };
         let (before, after) = (show(&text[from..at]), show(&text[at..until]));
         let marked = show(&text[at..(at + width).min(until)]).len();
@@ -208,7 +213,8 @@ mod tests {
     fn any_bytes_and_any_column_can_be_quoted() {
         let long = vec![0u8; 5000];
         for (column, text) in [(1, &b""[..]), (0, b"X"), (4000, &long), (u32::MAX, b"\xff\xfe\x1b[31m")] {
-            let failure = Failure::input("no").at(Path::new("x"), Place::new(3, column, usize::MAX / 4, text));
+            let failure =
+                Failure::input("no").at(Path::new("x"), Place::new(3, column, usize::MAX / 4, text));
             let shown = render(&failure);
             assert!(!shown.contains('\u{1b}') && shown.len() < 3000, "{shown}");
         }

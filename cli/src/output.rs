@@ -41,7 +41,10 @@ impl OutputSet {
     pub fn write(&mut self, name: &str, contents: &[u8]) -> Result<PathBuf, Failure> {
         let mut stream = self.stream(name)?;
         let path = self.folder.join(name);
-        stream.write_all(contents).and_then(|()| stream.flush()).map_err(|e| Failure::unwritable(&path, &e))?;
+        stream
+            .write_all(contents)
+            .and_then(|()| stream.flush())
+            .map_err(|e| Failure::unwritable(&path, &e))?;
         Ok(path)
     }
 
@@ -55,7 +58,8 @@ impl OutputSet {
             if path.is_dir() {
                 return Err(io::Error::from(io::ErrorKind::IsADirectory));
             }
-            let file = tempfile::Builder::new().prefix(".feedspline-").suffix(".part").tempfile_in(&self.folder)?;
+            let file =
+                tempfile::Builder::new().prefix(".feedspline-").suffix(".part").tempfile_in(&self.folder)?;
             let handle = file.as_file().try_clone()?;
             Ok((file, handle))
         };

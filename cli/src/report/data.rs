@@ -168,7 +168,14 @@ impl Data {
                 limit: points().map(|q| index(&q.limit)).collect(),
                 slow: points().map(|q| u8::from(q.slow)).collect(),
             },
-            pins: report.motion.slow.places.iter().take(PINS).map(|p| [p.at[0], p.at[1], p.at[2], p.time]).collect(),
+            pins: report
+                .motion
+                .slow
+                .places
+                .iter()
+                .take(PINS)
+                .map(|p| [p.at[0], p.at[1], p.at[2], p.time])
+                .collect(),
             unit: speed_unit(report),
         }
     }
@@ -191,8 +198,9 @@ fn mode(mode: &Mode) -> u8 {
 }
 
 fn spread(values: impl Iterator<Item = f64>) -> f64 {
-    let (low, high) =
-        values.filter(|v| v.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let (low, high) = values
+        .filter(|v| v.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     if high > low { high - low } else { 0.0 }
 }
 

@@ -16,14 +16,8 @@ impl Operations {
     ///
     /// One that has taken no time yet is renamed, so that a header of many comments makes no empty rows.
     pub fn begin(&mut self, name: &str, line: u32) {
-        let fresh = Operation {
-            name: name.into(),
-            line,
-            feed_s: 0.0,
-            rapid_s: 0.0,
-            dwell_s: 0.0,
-            feed_mm: 0.0,
-        };
+        let fresh =
+            Operation { name: name.into(), line, feed_s: 0.0, rapid_s: 0.0, dwell_s: 0.0, feed_mm: 0.0 };
         let full = self.done.len() == MOST;
         match self.done.last_mut() {
             Some(last) if last.seconds() == 0.0 => *last = fresh,

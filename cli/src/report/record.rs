@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 
 use super::envelope::every_other;
 use super::model::{
-    Axis, AxisTraces, Envelope, Limit, Mode, Motion, Picture, PicturePoint, Share, SlowPlace, SlowPlaces, Traces,
+    Axis, AxisTraces, Envelope, Limit, Mode, Motion, Picture, PicturePoint, Share, SlowPlace, SlowPlaces,
+    Traces,
 };
 use super::simplify::simplify;
 
@@ -136,6 +137,9 @@ impl Recorder {
             let step = (now.time - last.time).max(0.0);
             let still = step > LONGEST_STEP_S && now.speed == 0.0 && last.speed == 0.0;
             *self.shares.entry(if still { Limit::Dwell } else { now.limit }).or_insert(0.0) += step;
+            if let Some(limit) = self.traces.limit.last_mut().filter(|_| still) {
+                *limit = Limit::Dwell;
+            }
             let moved = if still { 0.0 } else { 0.5 * (last.speed + now.speed) * step };
             self.position += moved;
             self.follow_slow(now, &point, step, moved);
@@ -253,9 +257,8 @@ impl Recorder {
     /// Chooses the axes worth drawing and simplifies the line.
     fn picture(&mut self) -> Picture {
         let mut points = std::mem::take(&mut self.points);
-        let mut moving: Vec<usize> = (0..self.shown.len())
-            .filter(|&c| points.iter().any(|p| p.at[c] != points[0].at[c]))
-            .collect();
+        let mut moving: Vec<usize> =
+            (0..self.shown.len()).filter(|&c| points.iter().any(|p| p.at[c] != points[0].at[c])).collect();
         // A flat job stays in its plane even when one of its axes rests: show at least two axes if there are.
         for c in 0..self.shown.len() {
             if moving.len() == 1 && !moving.contains(&c) && self.axes[self.shown[c]].linear {

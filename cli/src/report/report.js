@@ -19,9 +19,9 @@
   const span = values => {
     let lo = Infinity, hi = -Infinity;
     for (const v of values) { if (v < lo) lo = v; if (v > hi) hi = v; }
-    return lo <= hi ? [lo, hi] : [0, 1];
+    return lo <= hi ? [lo, hi] : [0, 0];
   };
-  const topSpeed = Math.max(span(P.speed)[1], 1e-9);
+  const topSpeed = span(P.speed.filter((v, i) => P.mode[i] === 1))[1] || span(P.speed)[1] || 1;
 
   // Numbers and ticks.
   const niceStep = raw => {
@@ -35,8 +35,8 @@
   };
   const digits = step => Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   const show = v => {
-    if (!Number.isFinite(v)) return "\u2013";
-    return v === 0 ? "0" : fixed(v, 3 - Math.floor(Math.log10(Math.abs(v))));
+    if (!v) return v === 0 ? "0" : "\u2013";
+    return fixed(v, 3 - Math.floor(Math.log10(Math.abs(v))));
   };
   const ticks = (lo, hi, n) => {
     const step = niceStep((hi - lo) / Math.max(n, 1)), out = [];
@@ -62,12 +62,7 @@
     g.font = "11px system-ui, 'DejaVu Sans', sans-serif";
     return { g, w: box.width, h: box.height };
   };
-  const overlay = (figure, name) => {
-    const e = document.createElement("div");
-    e.className = name;
-    figure.append(e);
-    return e;
-  };
+  const overlay = (figure, name) => figure.appendChild(Object.assign(document.createElement("div"), { className: name }));
   const place = (e, x, y, w, h) => Object.assign(e.style, {
     display: "block", left: x + "px", top: y + "px",
     ...(w === undefined ? {} : { width: w + "px" }), ...(h === undefined ? {} : { height: h + "px" }),
@@ -98,37 +93,31 @@
   class Plot {
     constructor(figure) {
       this.figure = figure;
-      this.canvas = figure.querySelector("canvas");
-      this.output = figure.querySelector("output");
+      [this.canvas, this.output] = [figure.querySelector("canvas"), figure.querySelector("output")];
       this.kind = figure.dataset.plot;
       this.overPath = this.kind === "phase";
       this.axis = figure.dataset.axis === undefined ? null : D.axes[+figure.dataset.axis];
       this.x = this.overPath ? T.pos : T.time;
       if (this.axis) this.band = T.axes[+figure.dataset.axis][this.kind];
       else if (this.kind !== "strip") this.band = T.speed;
-      this.unit = this.axis ? { v: "/s", a: "/s\u00b2", j: "/s\u00b3", e: "" }[this.kind] : "";
-      this.unit = this.kind === "f" ? "" : this.axis ? this.axis.unit + this.unit : D.unit;
-      this.cursor = overlay(figure, "cursor");
-      this.box = overlay(figure, "band");
-      const bounds = (a, b) => [this.toX(Math.min(a[0], b[0])), this.toX(Math.max(a[0], b[0]))];
+      this.unit = figure.querySelector(".dim")?.textContent ?? "";
+      [this.cursor, this.box] = [overlay(figure, "cursor"), overlay(figure, "band")];
       dragging(this.canvas, (a, b) => {
         const x = Math.max(Math.min(a[0], b[0]), this.left), end = Math.min(Math.max(a[0], b[0]), this.w - this.right);
         place(this.box, x, this.canvas.offsetTop + this.top, Math.max(end - x, 0), this.h - this.top - this.bottom);
       }, (a, b) => {
         hide(this.box);
-        if (Math.abs(a[0] - b[0]) > 4) this.magnify(bounds(a, b));
+        if (Math.abs(a[0] - b[0]) > 4) this.magnify([a[0], b[0]].sort((p, q) => p - q).map(px => this.toX(px)));
       });
       this.canvas.addEventListener("dblclick", () => this.magnify(this.overPath ? far : whole));
       this.canvas.addEventListener("mousemove", e => {
-        const i = seek(this.x, this.toX(e.clientX - this.canvas.getBoundingClientRect().left));
-        point(T.time[i]);
+        point(T.time[seek(this.x, this.toX(e.clientX - this.canvas.getBoundingClientRect().left))]);
       });
       this.canvas.addEventListener("mouseleave", () => point(null));
     }
     get window() { return this.overPath ? reach : view; }
     magnify(window) {
-      const all = this.overPath ? far : whole;
-      const next = [Math.max(window[0], all[0]), Math.min(window[1], all[1])];
+      const all = this.overPath ? far : whole, next = [Math.max(window[0], all[0]), Math.min(window[1], all[1])];
       if (!(next[1] - next[0] > (all[1] - all[0]) * 1e-6)) return;
       if (this.overPath) reach = next; else view = next;
       for (const p of plots) if (p.overPath === this.overPath) p.draw();
@@ -138,10 +127,8 @@
       return a + (px - this.left) / Math.max(this.w - this.left - this.right, 1) * (b - a);
     }
     limits(i) {
-      const rapid = T.mode[i] === 2 ? 1 : 0;
-      if (!this.axis) return null;
-      if (this.kind === "f") return this.axis.f;
-      return this.kind === "e" ? null : this.axis[this.kind][rapid];
+      if (!this.axis || this.kind === "e") return null;
+      return this.kind === "f" ? this.axis.f : this.axis[this.kind][T.mode[i] === 2 ? 1 : 0];
     }
     range(a, b) {
       let lo = 0, hi = 0;
@@ -162,11 +149,8 @@
       const wide = w - this.left - this.right, high = h - this.top - this.bottom;
       const sx = v => this.left + (v - x0) / (x1 - x0) * wide;
       const a = seek(this.x, x0), b = Math.min(seek(this.x, x1) + 1, this.x.length - 1);
-      g.fillStyle = css("--dim");
-      g.strokeStyle = css("--grid");
-      g.lineWidth = 1;
+      Object.assign(g, { fillStyle: css("--dim"), strokeStyle: css("--grid"), lineWidth: 1, textBaseline: "top" });
       const xt = ticks(x0, x1, wide / 80);
-      g.textBaseline = "top";
       for (const [k, v] of xt.at.entries()) {
         const x = Math.round(sx(v)) + 0.5, text = xt.text(v) + (k === xt.at.length - 1 ? this.overPath ? " mm" : " s" : "");
         const half = g.measureText(text).width / 2;
@@ -187,8 +171,7 @@
       }
       const [y0, y1] = this.range(a, b), sy = v => this.top + (y1 - v) / (y1 - y0) * high;
       const yt = ticks(y0, y1, high / 30);
-      g.textAlign = "right";
-      g.textBaseline = "middle";
+      Object.assign(g, { textAlign: "right", textBaseline: "middle" });
       for (const v of yt.at) {
         const y = Math.round(sy(v)) + 0.5;
         g.strokeStyle = Math.abs(v) < 1e-12 ? css("--rule") : css("--grid");
@@ -197,9 +180,7 @@
       }
       g.save();
       g.beginPath(); g.rect(this.left, this.top - 1, wide, high + 2); g.clip();
-      g.lineJoin = "round";
-      g.strokeStyle = this.axis ? this.axis.colour : css("--trace");
-      g.lineWidth = 1.3;
+      Object.assign(g, { lineJoin: "round", lineWidth: 1.3, strokeStyle: this.axis ? this.axis.colour : css("--trace") });
       g.beginPath();
       for (let i = a; i <= b; i++) {
         const x = sx(this.x[i]), lo = this.band.lo[i], hi = this.band.hi[i];
@@ -207,8 +188,7 @@
         if (hi !== lo) g.lineTo(x, sy(lo));
       }
       g.stroke();
-      g.strokeStyle = css("--limit");
-      g.lineWidth = 1;
+      Object.assign(g, { strokeStyle: css("--limit"), lineWidth: 1 });
       g.setLineDash([5, 4]);
       for (const sign of this.axis ? [1, -1] : [1]) {
         g.beginPath();
@@ -236,19 +216,17 @@
       }
       const lo = this.band.lo[i], hi = this.band.hi[i];
       const value = hi - lo > (Math.abs(hi) + Math.abs(lo)) * 0.01 ? `${show(lo)} to ${show(hi)}` : show(hi);
-      this.output.textContent = `${value}${this.unit ? " " + this.unit : ""}`;
+      this.output.textContent = `${value} ${this.unit}`;
     }
   }
 
   class Picture {
     constructor(figure) {
       this.figure = figure;
-      this.canvas = figure.querySelector("canvas");
-      this.output = figure.querySelector("output");
+      [this.canvas, this.output] = [figure.querySelector("canvas"), figure.querySelector("output")];
       this.space = figure.dataset.view === "space";
       this.flatTime = P.at.length < 2;
-      this.dot = overlay(figure, "dot");
-      this.box = overlay(figure, "band");
+      [this.dot, this.box] = [overlay(figure, "dot"), overlay(figure, "band")];
       this.reset();
       dragging(this.canvas, (a, b) => {
         if (this.space) {
@@ -295,7 +273,7 @@
       const X = this.flatTime ? P.time : P.at[0], Y = this.flatTime ? P.at[0] : P.at[1], Z = P.at[2];
       const u = new Float64Array(n), v = new Float64Array(n);
       for (let i = 0; i < n; i++) [u[i], v[i]] = this.project(X[i], Y[i], Z ? Z[i] : 0);
-      const [left, bottom, edge] = this.space ? [20, 20, 20] : [58, 26, 18];
+      const [left, bottom, edge] = this.space ? [24, 24, 24] : [58, 26, 24];
       const frame = this.frame || [...span(u), ...span(v)];
       const wu = Math.max(frame[1] - frame[0], 1e-9), wv = Math.max(frame[3] - frame[2], 1e-9);
       let kx = (w - left - edge) / wu, ky = (h - bottom - edge) / wv;
@@ -318,24 +296,24 @@
           any = joined = true;
         }
         if (!any) return;
-        g.strokeStyle = colour; g.lineWidth = width; g.setLineDash(dash || []);
+        Object.assign(g, { strokeStyle: colour, lineWidth: width }).setLineDash(dash || []);
         g.stroke();
       };
       const marks = document.getElementById("slow").checked, byLimit = colouring() === "limit";
       stroke(i => P.mode[i] === 2, css("--rapid"), 1, [4, 5]);
-      if (marks) stroke(i => P.mode[i] !== 2 && P.slow[i], css("--halo"), 6);
+      if (marks) stroke(i => P.mode[i] !== 2 && P.slow[i], css("--halo"), 5.5);
       const bins = byLimit ? D.legend.length : 40;
       const bin = Int16Array.from(P.speed, (s, i) => P.mode[i] === 2 ? -1 : byLimit ? P.limit[i] : Math.min(Math.floor(s / topSpeed * bins), bins - 1));
       for (let k = bins - 1; k >= 0; k--) {
-        stroke(i => bin[i] === k, byLimit ? D.legend[k].colour : heat((k + 0.5) / bins), 2);
+        stroke(i => bin[i] === k, byLimit ? D.legend[k].colour : heat((k + 0.5) / bins), 2.2);
       }
       if (marks) this.pins(g);
       g.restore();
     }
     pins(g) {
       const taken = [];
-      g.font = "bold 10px system-ui, 'DejaVu Sans', sans-serif";
-      g.textAlign = "center"; g.textBaseline = "middle"; g.setLineDash([]); g.lineWidth = 1;
+      g.setLineDash([]);
+      Object.assign(g, { font: "bold 10px system-ui, 'DejaVu Sans', sans-serif", textAlign: "center", textBaseline: "middle", lineWidth: 1 });
       D.pins.forEach((pin, k) => {
         const [u, v] = this.flatTime ? [pin[3], pin[0]] : this.project(pin[0], pin[1], pin[2]);
         const x = this.ox + (u - this.x0) * this.kx, y = this.oy - (v - this.y0) * this.ky;
@@ -345,7 +323,7 @@
         if (!free) return;
         const cx = x + free[0], cy = y + free[1];
         taken.push([cx, cy]);
-        g.strokeStyle = css("--ink"); g.fillStyle = css("--panel");
+        Object.assign(g, { strokeStyle: css("--ink"), fillStyle: css("--panel") });
         g.beginPath(); g.moveTo(x, y); g.lineTo(cx, cy); g.stroke();
         g.beginPath(); g.arc(cx, cy, 8, 0, 7); g.fill(); g.stroke();
         g.fillStyle = css("--ink");
@@ -354,10 +332,9 @@
     }
     rulers(g, w, h, left, bottom) {
       const [a, b] = [this.back([left, h - bottom]), this.back([w, 0])];
-      g.strokeStyle = css("--grid"); g.fillStyle = css("--dim"); g.lineWidth = 1;
+      Object.assign(g, { fillStyle: css("--dim"), strokeStyle: css("--grid"), lineWidth: 1, textAlign: "center", textBaseline: "top" });
       const names = this.flatTime ? [["t", "s"], P.axes[0]] : P.axes;
       const xt = ticks(a[0], b[0], (w - left) / 80), yt = ticks(a[1], b[1], (h - bottom) / 50);
-      g.textAlign = "center"; g.textBaseline = "top";
       for (const v of xt.at) {
         const x = Math.round(this.ox + (v - this.x0) * this.kx) + 0.5;
         g.beginPath(); g.moveTo(x, 0); g.lineTo(x, h - bottom); g.stroke();
@@ -374,8 +351,7 @@
       g.fillText(`${names[1][0]} [${names[1][1]}]`, left - 6, 12);
     }
     triad(g, h) {
-      g.strokeStyle = g.fillStyle = css("--dim"); g.lineWidth = 1.2;
-      g.textAlign = "center"; g.textBaseline = "middle";
+      Object.assign(g, { fillStyle: css("--dim"), strokeStyle: css("--dim"), lineWidth: 1.2, textAlign: "center", textBaseline: "middle" });
       [[1, 0, 0], [0, 1, 0], [0, 0, 1]].forEach((e, k) => {
         const [u, v] = this.project(...e);
         g.beginPath(); g.moveTo(50, h - 46); g.lineTo(50 + u * 26, h - 46 - v * 26); g.stroke();
@@ -385,8 +361,8 @@
     mark(i) {
       if (i === null || !this.px) { hide(this.dot); this.output.textContent = ""; return; }
       place(this.dot, this.px[i], this.canvas.offsetTop + this.py[i]);
-      const what = P.mode[i] === 2 ? "rapid" : D.legend[P.limit[i]].label;
-      this.output.textContent = `line ${P.line[i]}: ${show(P.speed[i])} ${D.unit} at ${show(P.time[i])} s, ${P.mode[i] === 2 ? what : "limit: " + what}`;
+      const kind = P.mode[i] === 2 ? "rapid, " : "";
+      this.output.textContent = `line ${P.line[i]}: ${show(P.speed[i])} ${D.unit} at ${show(P.time[i])} s, ${kind}limit: ${D.legend[P.limit[i]].label}`;
     }
   }
 
@@ -401,10 +377,8 @@
     const box = document.getElementById("scale");
     if (!box) return;
     box.hidden = colouring() === "limit";
-    box.innerHTML = "<span></span><i></i><span></span>";
-    box.children[0].textContent = "0";
-    const steps = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10].map(k => heat(k / 10));
-    box.children[1].style.background = `linear-gradient(to right, ${steps.join()})`;
+    box.innerHTML = "<span>0</span><i></i><span></span>";
+    box.children[1].style.background = `linear-gradient(to right, ${[0, 1, 2, 3, 4, 5, 6, 7, 8].map(k => heat(k / 8)).join()})`;
     box.children[2].textContent = `${show(topSpeed)} ${D.unit}`;
   };
   const drawAll = () => { scale(); for (const p of [...pictures, ...plots]) p.draw(); };

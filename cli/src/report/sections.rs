@@ -60,11 +60,11 @@ pub(super) fn headline(report: &Report) -> Markup {
                     "",
                 ))
             }
-            @if let Some(stop) = t.stop_every_block_s {
+            @if let Some(stop) = t.stop_every_block_s.filter(|_| t.motion_s > 0.0) {
                 (card(
                     "Stopping at every block",
                     &duration(stop),
-                    &format!("{} as long as this plan", times(stop / t.motion_s.max(f64::MIN_POSITIVE))),
+                    &format!("{} as long as this plan", times(stop / t.motion_s)),
                     "",
                 ))
             }
@@ -86,7 +86,7 @@ pub(super) fn headline(report: &Report) -> Markup {
                 @let all = arrived == sim.axes.len();
                 (card(
                     "End state, simulated",
-                    if all { "\u{2713} on the count, at rest" } else { "\u{2717} off the end point" },
+                    if all { "\u{2713} exact, at rest" } else { "\u{2717} off the end point" },
                     &format!("{arrived} of {} drives, {} set-points each", sim.axes.len(), count(sim.setpoints)),
                     if all { "good" } else { "bad" },
                 ))
@@ -223,7 +223,7 @@ pub(super) fn speed(report: &Report) -> Markup {
             h2 { "Speed" }
             div.pair {
                 (plot("speed", None, "Over time", unit))
-                (plot("phase", None, "Over the path", unit))
+                (plot("phase", None, "Phase plot: over the path", unit))
             }
             p.note {
                 "Dashed: the most that the programmed feed and the axis velocities allow at that place. "

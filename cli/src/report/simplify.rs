@@ -116,8 +116,9 @@ mod tests {
 
     #[test]
     fn noise_is_kept_within_the_budget() {
-        let line: Vec<_> =
-            (0..20_000).map(|i| point(f64::from(i % 97), f64::from(i * 31 % 89), f64::from(i % 13))).collect();
+        let line: Vec<_> = (0..20_000)
+            .map(|i| point(f64::from(i % 97), f64::from(i * 31 % 89), f64::from(i % 13)))
+            .collect();
         let drawn = simplify(line, 700);
         assert!(drawn.len() <= 701, "{}", drawn.len());
     }

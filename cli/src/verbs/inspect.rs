@@ -11,7 +11,11 @@ use crate::summary;
 ///
 /// # Errors
 /// The file cannot be read or is no feed table.
-pub fn execute(args: &InspectArgs, engine: &dyn Engine, console: &mut Console<'_>) -> Result<Verdict, Failure> {
+pub fn execute(
+    args: &InspectArgs,
+    engine: &dyn Engine,
+    console: &mut Console<'_>,
+) -> Result<Verdict, Failure> {
     let result = engine.inspect(&args.file)?;
     console.show(&result, &summary::inspect(&result));
     Ok(Verdict::Holds)

@@ -12,7 +12,11 @@ use crate::summary;
 ///
 /// # Errors
 /// The file cannot be read or is no feed table.
-pub fn execute(args: &VerifyArgs, engine: &dyn Engine, console: &mut Console<'_>) -> Result<Verdict, Failure> {
+pub fn execute(
+    args: &VerifyArgs,
+    engine: &dyn Engine,
+    console: &mut Console<'_>,
+) -> Result<Verdict, Failure> {
     let mut progress = Progress::new(console.talk());
     let result = engine.verify(&args.file, &mut progress)?;
     drop(progress);

@@ -3,18 +3,16 @@
 use std::f64::consts::TAU;
 
 use cli::engine::Outcome;
-use cli::json::{
-    AxisJson, BoxJson, CertificateJson, FilesJson, NoteJson, PlanJson, SimulationJson,
-};
+use cli::json::{AxisJson, BoxJson, CertificateJson, FilesJson, NoteJson, PlanJson, SimulationJson};
 use cli::report::model::{
-    Axis, Bounds, Certificate, Counts, DriveEnd, Limit, Mode, Operation, Planning, Ratios, Report, Simulation,
-    Stops, TableSize, Times, Tolerance,
+    Axis, Bounds, Certificate, Counts, DriveEnd, Limit, Mode, Operation, Planning, Ratios, Report,
+    Simulation, Stops, TableSize, Times, Tolerance,
 };
 use cli::report::record::{AxisInstant, DriveInstant, Instant, Recorder};
 
 /// Which axes the sample machine has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// X, Y, Z mill with all three moving.
     Space,
     /// X, Y plotter.
@@ -28,7 +26,7 @@ pub enum Kind {
 const TICK_S: f64 = 1e-3;
 
 /// The axes of a sample machine.
-pub fn axes(kind: Kind) -> Vec<Axis> {
+pub(crate) fn axes(kind: Kind) -> Vec<Axis> {
     let slide = |name: &str, velocity: f64| {
         let bounds = |s: f64| Bounds { velocity: s * velocity, acceleration: 1500.0, jerk: Some(50_000.0) };
         Axis {
@@ -60,9 +58,8 @@ struct Curve {
 }
 
 fn curves(size: f64) -> Vec<Curve> {
-    let line = move |a: [f64; 3], b: [f64; 3]| {
-        move |s: f64| std::array::from_fn(|c| a[c] + s * (b[c] - a[c]))
-    };
+    let line =
+        move |a: [f64; 3], b: [f64; 3]| move |s: f64| std::array::from_fn(|c| a[c] + s * (b[c] - a[c]));
     let lissajous = move |s: f64| {
         let t = TAU * s;
         let (x, y) = (100.0 + 80.0 * (3.0 * t).sin() * size, 80.0 + 60.0 * (4.0 * t).sin() * size);
@@ -122,16 +119,20 @@ fn ride(curve: &Curve, axes: &[Axis], map: &dyn Fn([f64; 3]) -> Vec<f64>) -> Vec
         }
     }
     for i in 1..=n {
-        sweep(&mut v, &mut why, i, i - 1, step[i - 1]);
+        sweep(&mut v, &mut why, i, i - 1, step[i - 1], axes.len());
     }
     for i in (0..n).rev() {
-        sweep(&mut v, &mut why, i, i + 1, step[i]);
+        sweep(&mut v, &mut why, i, i + 1, step[i], axes.len());
     }
     let mut out = Vec::new();
     let (mut i, mut x) = (0, 0.0);
     while i < n {
         let f = x / step[i];
-        let speed = (v[i] * v[i] + f * (v[i + 1] * v[i + 1] - v[i] * v[i])).max(0.0).sqrt().max(0.3);
+        let speed = (v[i] * v[i] + f * (v[i + 1] * v[i + 1] - v[i] * v[i]))
+            .max(0.0)
+            .sqrt()
+            .max(0.05 * v[i].max(v[i + 1]))
+            .max(0.3);
         let at = p[i].iter().zip(&p[i + 1]).map(|(a, b)| a + f * (b - a)).collect();
         out.push((i as f64 / n as f64, at, why[i]));
         x += speed * TICK_S;
@@ -144,11 +145,11 @@ fn ride(curve: &Curve, axes: &[Axis], map: &dyn Fn([f64; 3]) -> Vec<f64>) -> Vec
     out
 }
 
-fn sweep(v: &mut [f64], why: &mut [Limit], i: usize, from: usize, step: f64) {
-    let cap = (v[from] * v[from] + 2.0 * 900.0 * step).sqrt();
+fn sweep(v: &mut [f64], why: &mut [Limit], i: usize, from: usize, step: f64, axes: usize) {
+    let cap = (v[from] * v[from] + 2.0 * 800.0 * step).sqrt();
     if cap < v[i] {
         v[i] = cap;
-        why[i] = if cap < 18.0 { Limit::Rest } else { Limit::Jerk((i / 700 % 2) as u8) };
+        why[i] = if cap < 18.0 { Limit::Rest } else { Limit::Jerk((i / 700 % axes.min(2)) as u8) };
     }
 }
 
@@ -157,7 +158,7 @@ fn dist(a: &[f64], b: &[f64]) -> f64 {
 }
 
 fn smooth(values: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let half = 12usize;
+    let half = 11usize;
     (0..values.len())
         .map(|i| {
             let window = &values[i.saturating_sub(half)..(i + half + 1).min(values.len())];
@@ -169,7 +170,7 @@ fn smooth(values: &[Vec<f64>]) -> Vec<Vec<f64>> {
 }
 
 /// The report of a sample job, whose length grows with `rounds`.
-pub fn report(kind: Kind, rounds: usize) -> Report {
+pub(crate) fn report(kind: Kind, rounds: usize) -> Report {
     let axes = axes(kind);
     let map: Box<dyn Fn([f64; 3]) -> Vec<f64>> = match kind {
         Kind::Space => Box::new(|p| p.to_vec()),
@@ -182,8 +183,12 @@ pub fn report(kind: Kind, rounds: usize) -> Report {
     let mut motion_s = 0.0;
     for round in 0..rounds {
         for curve in curves(1.0 / (1.0 + 0.02 * round as f64)) {
+            // Standing still before and after, so that smoothing makes soft starts and stops.
             let ticks = ride(&curve, &axes, &*map);
-            let at = smooth(&smooth(&ticks.iter().map(|t| t.1.clone()).collect::<Vec<_>>()));
+            let hold = |k: usize| std::iter::repeat_n((ticks[k].0, ticks[k].1.clone(), Limit::Rest), 40);
+            let ticks: Vec<_> = hold(0).chain(ticks.iter().cloned()).chain(hold(ticks.len() - 1)).collect();
+            let at = ticks.iter().map(|t| t.1.clone()).collect::<Vec<_>>();
+            let at = smooth(&smooth(&smooth(&at)));
             let still = |k: usize| at[at.len() - 1 - k.min(at.len() - 1)].clone();
             let begin = time;
             for i in 0..at.len() {
@@ -209,7 +214,8 @@ pub fn report(kind: Kind, rounds: usize) -> Report {
                         }
                     })
                     .collect();
-                let speed = instants.iter().zip(&axes).filter(|(_, a)| a.linear).map(|(i, _)| i.velocity.powi(2));
+                let speed =
+                    instants.iter().zip(&axes).filter(|(_, a)| a.linear).map(|(i, _)| i.velocity.powi(2));
                 let [from, to] = curve.lines;
                 recorder.push(&Instant {
                     time,
@@ -227,10 +233,22 @@ pub fn report(kind: Kind, rounds: usize) -> Report {
             let position = still(0);
             let rest: Vec<AxisInstant> = position
                 .iter()
-                .map(|&position| AxisInstant { position, drive: Some(DriveInstant::default()), ..AxisInstant::default() })
+                .map(|&position| AxisInstant {
+                    position,
+                    drive: Some(DriveInstant::default()),
+                    ..AxisInstant::default()
+                })
                 .collect();
             let (mode, limit) = (Mode::Still, Limit::Rest);
-            recorder.push(&Instant { time, line: curve.lines[1], mode, limit, speed: 0.0, feed: None, axes: &rest });
+            recorder.push(&Instant {
+                time,
+                line: curve.lines[1],
+                mode,
+                limit,
+                speed: 0.0,
+                feed: None,
+                axes: &rest,
+            });
         }
     }
     finish(axes, recorder, time, motion_s)
@@ -259,12 +277,27 @@ fn finish(axes: Vec<Axis>, recorder: Recorder, cycle_s: f64, motion_s: f64) -> R
         rms_error: 0.000_82,
         effort_ratio: 0.63,
     };
-    let stops = [("between rapid and feed", 8), ("program end", 1), ("tool change", 1), ("reversal over 170\u{b0}", 1)];
+    let stops = [
+        ("between rapid and feed", 8),
+        ("program end", 1),
+        ("tool change", 1),
+        ("reversal over 170\u{b0}", 1),
+    ];
     Report {
         job: "lissajous.ngc".into(),
         machine: "three-axis mill".into(),
-        times: Times { cycle_s, motion_s, constant_feed_s: 0.87 * motion_s, stop_every_block_s: Some(11.4 * motion_s) },
-        tolerance: Tolerance { tolerance_mm: 0.01, source: "machine".into(), deviation_mm: 0.00973, line: 412 },
+        times: Times {
+            cycle_s,
+            motion_s,
+            constant_feed_s: 0.87 * motion_s,
+            stop_every_block_s: Some(11.4 * motion_s),
+        },
+        tolerance: Tolerance {
+            tolerance_mm: 0.01,
+            source: "machine".into(),
+            deviation_mm: 0.00973,
+            line: 412,
+        },
         counts: Counts {
             blocks: 1608,
             rapids: 5,
@@ -275,7 +308,10 @@ fn finish(axes: Vec<Axis>, recorder: Recorder, cycle_s: f64, motion_s: f64) -> R
             feed_mm: 2178.4,
             rapid_mm: 441.2,
         },
-        operations: vec![operation("T1 6 mm end mill: contour", 5, 0.62), operation("T2 engraver: wave", 1210, 0.38)],
+        operations: vec![
+            operation("T1 6 mm end mill: contour", 5, 0.62),
+            operation("T2 engraver: wave", 1210, 0.38),
+        ],
         stops: stops.map(|(cause, count)| Stops { cause: cause.into(), count }).to_vec(),
         certificate: Certificate {
             verdict: CertificateJson {
@@ -314,7 +350,7 @@ fn finish(axes: Vec<Axis>, recorder: Recorder, cycle_s: f64, motion_s: f64) -> R
 }
 
 /// A whole outcome of `plan` or `run` around a small sample report.
-pub fn outcome(simulated: bool) -> Outcome {
+pub(crate) fn outcome(simulated: bool) -> Outcome {
     let mut report = report(Kind::Flat, 1);
     let simulation = SimulationJson {
         setpoints: 23_410,

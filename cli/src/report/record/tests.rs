@@ -23,13 +23,19 @@ fn drive(n: u32, feed: f64, speed: impl Fn(f64) -> f64) -> Motion {
         let time = f64::from(i) * 1e-3;
         let v = speed(time);
         x += v * 1e-3;
-        let axes = [
-            AxisInstant { position: x, velocity: v, ..AxisInstant::default() },
-            AxisInstant::default(),
-        ];
+        let axes =
+            [AxisInstant { position: x, velocity: v, ..AxisInstant::default() }, AxisInstant::default()];
         let limit = if v < feed { Limit::Acceleration(0) } else { Limit::Feed };
         let mode = Mode::Feed;
-        recorder.push(&Instant { time, line: 1 + i / 10, mode, limit, speed: v, feed: Some(feed), axes: &axes });
+        recorder.push(&Instant {
+            time,
+            line: 1 + i / 10,
+            mode,
+            limit,
+            speed: v,
+            feed: Some(feed),
+            axes: &axes,
+        });
     }
     recorder.finish()
 }
