@@ -4,12 +4,16 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::cells::visit;
+use super::cells::{feed_ratio, nearest_limit};
+use super::motion::{AxisState, MotionSpan, pieces, spans};
 use crate::feed::job::PlannedSection;
+use crate::geometry::grid_path::Piece;
+use crate::geometry::section::SpeedCap;
+use crate::tolerances::BINDING;
 use crate::topp::problem::Binding;
 
-/// Cells that a span is cut into.
-const PER_SPAN: usize = 3;
+/// Places of a span that are looked at, both ends among them.
+const PER_SPAN: u32 = 5;
 
 /// Time by ruling limit, over any number of sections.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -31,11 +35,24 @@ pub struct Share {
 }
 
 impl BindingShares {
-    /// Adds one section; what rules is read off the table itself.
+    /// Adds one section.
+    ///
+    /// What rules is read off the table itself: a span counts for the limit that comes nearest to being reached
+    /// anywhere on it, if it is reached to within [`BINDING`]. A quadratic q cannot hold a limit all along a
+    /// span, so the places within a span do not count one by one.
     pub fn add(&mut self, section: &PlannedSection) {
-        visit(section, PER_SPAN, |cell| {
-            *self.seconds.entry(cell.binding(&section.limits)).or_insert(0.0) += cell.seconds;
-        });
+        let table = &section.table;
+        let last = table.spans().saturating_sub(1);
+        let (mut geometry, mut cubics) = (usize::MAX, Vec::new());
+        for span in spans(table) {
+            if span.geometry != geometry {
+                geometry = span.geometry;
+                cubics = pieces(table, geometry);
+            }
+            let rests = span.index == 0 || span.index == last;
+            let binding = if rests { Binding::Rest } else { ruling(section, &span, &cubics) };
+            *self.seconds.entry(binding).or_insert(0.0) += span.duration_s;
+        }
     }
 
     /// Adds what another collected.
@@ -54,6 +71,31 @@ impl BindingShares {
         };
         self.seconds.iter().map(share).collect()
     }
+}
+
+/// What rules an inner span.
+fn ruling(section: &PlannedSection, span: &MotionSpan, cubics: &[Piece]) -> Binding {
+    let (grid, caps) = (&section.table.path.axes, &section.marks.caps);
+    let mut axes = vec![AxisState::default(); grid.len()];
+    let mut most = (Binding::Free, 1.0 - BINDING);
+    for k in 0..PER_SPAN {
+        let share = f64::from(k) / f64::from(PER_SPAN - 1);
+        let path = span.at_place(share * span.length());
+        for ((axis, cubic), grid) in axes.iter_mut().zip(cubics).zip(grid) {
+            *axis = span.axis(cubic, grid.lsb, &path);
+        }
+        // The cap that holds inside the span next to this place.
+        let place = span.from as f64 + share * (span.to - span.from) as f64;
+        let passed = |until: u64| if k == 0 { until as f64 <= place } else { (until as f64) < place };
+        let cap = caps.get(caps.partition_point(|c| passed(c.until))).map_or(SpeedCap::None, |c| c.speed);
+        let feed = (Binding::Feed, feed_ratio(cap, path.speed, &axes).unwrap_or(0.0));
+        for found in [feed, nearest_limit(&axes, &section.limits)] {
+            if found.1 > most.1 {
+                most = found;
+            }
+        }
+    }
+    most.0
 }
 
 /// Name and axis of a ruling limit.

@@ -4,7 +4,6 @@ use super::motion::{AxisState, MotionSpan, PathState, pieces, spans};
 use crate::feed::job::PlannedSection;
 use crate::geometry::section::SpeedCap;
 use crate::job::machine::AxisLimits;
-use crate::tolerances::BINDING;
 use crate::topp::problem::Binding;
 
 /// A small part of a section.
@@ -90,50 +89,38 @@ fn crossing(span: &MotionSpan, from: f64, to: f64) -> f64 {
 impl Cell<'_> {
     /// Path speed / cap in the middle of the cell; `None` without a cap.
     pub fn feed_ratio(&self) -> Option<f64> {
-        match self.cap {
-            SpeedCap::None => None,
-            SpeedCap::Rate(rate) => Some(self.path.speed / rate),
-            SpeedCap::Tangential { axes, speed } => {
-                let counted = self.axes.iter().enumerate().filter(|(i, _)| axes >> i & 1 == 1);
-                Some(counted.map(|(_, a)| a.velocity * a.velocity).sum::<f64>().sqrt() / speed)
+        feed_ratio(self.cap, self.path.speed, self.axes)
+    }
+}
+
+/// Path speed / cap; `None` without a cap.
+pub fn feed_ratio(cap: SpeedCap, rate: f64, axes: &[AxisState]) -> Option<f64> {
+    match cap {
+        SpeedCap::None => None,
+        SpeedCap::Rate(limit) => Some(rate / limit),
+        SpeedCap::Tangential { axes: mask, speed } => {
+            let counted = axes.iter().enumerate().filter(|(i, _)| mask >> i & 1 == 1);
+            Some(counted.map(|(_, a)| a.velocity * a.velocity).sum::<f64>().sqrt() / speed)
+        }
+    }
+}
+
+/// The axis limit that is nearest, and value / limit of it.
+pub fn nearest_limit(axes: &[AxisState], limits: &[AxisLimits]) -> (Binding, f64) {
+    let mut nearest = (Binding::Free, 0.0);
+    for (i, (a, limit)) in axes.iter().zip(limits).enumerate() {
+        let axis = i as u8;
+        for (binding, ratio) in [
+            (Binding::Velocity(axis), a.velocity.abs() / limit.velocity),
+            (Binding::Acceleration(axis), a.acceleration.abs() / limit.acceleration),
+            (Binding::Jerk(axis), a.jerk.abs() / limit.jerk),
+        ] {
+            if ratio > nearest.1 {
+                nearest = (binding, ratio);
             }
         }
     }
-
-    /// The axis limit that is nearest, and value / limit of it.
-    pub fn nearest_limit(&self, limits: &[AxisLimits]) -> (Binding, f64) {
-        let mut nearest = (Binding::Free, 0.0);
-        for (i, (a, limit)) in self.axes.iter().zip(limits).enumerate() {
-            let axis = i as u8;
-            for (binding, ratio) in [
-                (Binding::Velocity(axis), a.velocity.abs() / limit.velocity),
-                (Binding::Acceleration(axis), a.acceleration.abs() / limit.acceleration),
-                (Binding::Jerk(axis), a.jerk.abs() / limit.jerk),
-            ] {
-                if ratio > nearest.1 {
-                    nearest = (binding, ratio);
-                }
-            }
-        }
-        nearest
-    }
-
-    /// What rules the motion here: the rest, the feed or an axis limit within [`BINDING`] of being reached, or
-    /// nothing.
-    pub fn binding(&self, limits: &[AxisLimits]) -> Binding {
-        if self.rests {
-            return Binding::Rest;
-        }
-        let (limit, ratio) = self.nearest_limit(limits);
-        let feed = self.feed_ratio().unwrap_or(0.0);
-        if feed.max(ratio) < 1.0 - BINDING {
-            Binding::Free
-        } else if feed >= ratio {
-            Binding::Feed
-        } else {
-            limit
-        }
-    }
+    nearest
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::binding::name;
-use super::cells::{Cell, visit};
+use super::cells::{Cell, nearest_limit, visit};
 use crate::feed::job::PlannedSection;
 use crate::geometry::section::SpeedCap;
 use crate::job::program::MoveKind;
@@ -159,7 +159,7 @@ impl Open {
         let covered = mean_ratio(cell, ratio) * cell.seconds;
         self.covered += covered;
         s.lost_s += cell.seconds - covered;
-        let binding = if cell.rests { Binding::Rest } else { cell.nearest_limit(&section.limits).0 };
+        let binding = if cell.rests { Binding::Rest } else { nearest_limit(cell.axes, &section.limits).0 };
         *self.limits.entry(binding).or_insert(0.0) += cell.seconds;
     }
 
