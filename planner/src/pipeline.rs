@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::certificate::{Certificate, certify};
 use crate::feed::job::{JobItem, PlannedSection};
-use crate::geometry::section::{Marks, Section};
+use crate::geometry::section::Section;
 use crate::geometry::sections::SectionItem;
 use crate::job::machine::{Axis, AxisLimits, Machine};
 use crate::job::program::MoveKind;
@@ -202,15 +202,8 @@ fn plan_section<E>(
     let problem =
         Problem { path: &path, limits: &limits, caps: &marks.caps, shortest_span_s: machine.control_tick_s };
     let plan = topp::plan(&problem, settings)
-        .map_err(|fault| JobError::Plan { line: line_at(&marks, fault.place(), path.step), fault })?;
+        .map_err(|fault| JobError::Plan { line: marks.line_at(fault.place().unwrap_or(0.0) / path.step), fault })?;
     let certificate = certify(&plan.table, &limits, &marks.caps);
     let section = PlannedSection { kind, limits, table: plan.table, marks };
     Ok(Planned::Section { section, certificate, binding: plan.binding, iterations: plan.iterations })
-}
-
-/// The program line that made the place `u`; the section's first without a place.
-fn line_at(marks: &Marks, u: Option<f64>, step: f64) -> u32 {
-    let u = u.unwrap_or(0.0);
-    let block = marks.blocks.iter().find(|b| b.until as f64 * step > u).or(marks.blocks.last());
-    block.map_or(0, |b| b.line)
 }

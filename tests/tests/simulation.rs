@@ -55,6 +55,8 @@ fn machine() -> Machine {
         control_tick_s: 1e-3,
         tolerance_mm: 0.01,
         tolerance_rotary: 0.01,
+        best_speed_mm: 0.05,
+        exact_path_mm: 0.001,
         corner: CornerMode::Blend,
         axes: vec![axis("X", Unit::Mm), axis("Y", Unit::Mm), axis("A", Unit::Deg)],
         home: [0.0; MAX_AXES],

@@ -26,7 +26,7 @@ pub use travel::position_bounds;
 
 use bernstein::{Locus, Peak};
 use hodograph::{Hodograph, Rate};
-use spans::{CapPart, Peaks, Rest};
+use spans::{AxisPeaks, CapPart, Peaks, Rest};
 
 /// Spans that one task bounds. Fixed, so that the outcome does not depend on the number of threads.
 const CHUNK: usize = 512;
@@ -44,10 +44,39 @@ pub struct Certificate {
     pub feed_ratio: f64,
     /// The table is a motion from rest to rest and every ratio is at most 1 + [`CERTIFICATE_RATIO`].
     pub holds: bool,
+    /// The same ratios of each axis.
+    pub axes: Vec<AxisRatios>,
     /// Where each kind comes nearest its limit; kinds that nothing limits are missing.
     pub worst: Vec<Worst>,
     /// Why the table is not a motion at all; every ratio is then infinite.
     pub defect: Option<TableDefect>,
+}
+
+/// What is proven of one axis. Ratios are value / limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct AxisRatios {
+    /// Largest |velocity| / limit.
+    pub velocity: f64,
+    /// Largest |acceleration| / limit.
+    pub acceleration: f64,
+    /// Largest |jerk| / limit; 0 where jerk is not limited.
+    pub jerk: f64,
+}
+
+impl AxisRatios {
+    fn of(peaks: &AxisPeaks) -> Self {
+        let AxisPeaks { velocity, acceleration, jerk } = peaks;
+        Self { velocity: velocity.bound, acceleration: acceleration.bound, jerk: jerk.bound }
+    }
+
+    /// The larger of each.
+    pub fn max(self, other: Self) -> Self {
+        Self {
+            velocity: self.velocity.max(other.velocity),
+            acceleration: self.acceleration.max(other.acceleration),
+            jerk: self.jerk.max(other.jerk),
+        }
+    }
 }
 
 /// The place at which one kind of limit is nearest.
@@ -92,13 +121,14 @@ pub fn certify(table: &FeedTable, limits: &[AxisLimits], caps: &[FeedCap]) -> Ce
     };
     if let Err(defect) = checked {
         let [velocity_ratio, acceleration_ratio, jerk_ratio, feed_ratio] = [f64::INFINITY; 4];
-        let (holds, worst, defect) = (false, Vec::new(), Some(defect));
+        let (holds, axes, worst, defect) = (false, Vec::new(), Vec::new(), Some(defect));
         return Certificate {
             velocity_ratio,
             acceleration_ratio,
             jerk_ratio,
             feed_ratio,
             holds,
+            axes,
             worst,
             defect,
         };
@@ -154,7 +184,7 @@ fn bound_chunk(
             let q = table.value(table.codes[if lands { n - 3 } else { 0 }]);
             let rest = Rest { h: table.step_length(i), q };
             for (axis, p) in parts.iter().enumerate() {
-                rest.axis(&mut peaks, p, &limits[axis], at(axis));
+                rest.axis(&mut peaks.axes[axis], p, &limits[axis], at(axis));
             }
             for cap in cap_parts(caps, place, end, lands) {
                 rest.cap(&mut peaks.feed, &parts, cap, at(0));
@@ -162,7 +192,7 @@ fn bound_chunk(
         } else {
             let rate = Rate::of(table, i);
             for (axis, p) in parts.iter().enumerate() {
-                spans::inner_axis(&mut peaks, p, &rate, &limits[axis], at(axis));
+                spans::inner_axis(&mut peaks.axes[axis], p, &rate, &limits[axis], at(axis));
             }
             for cap in cap_parts(caps, place, end, false) {
                 spans::inner_cap(&mut peaks.feed, &parts, &rate, cap, at(0));
@@ -194,10 +224,12 @@ fn cap_parts(caps: &[FeedCap], start: u64, end: u64, mirrored: bool) -> impl Ite
 
 /// Turns peaks into a certificate.
 fn conclude(table: &FeedTable, peaks: Peaks) -> Certificate {
+    let axes = &peaks.axes[..table.path.axes.len()];
+    let all = axes.iter().skip(1).fold(axes[0], |all, axis| all.merge(*axis));
     let kinds = [
-        (LimitKind::Velocity, peaks.velocity),
-        (LimitKind::Acceleration, peaks.acceleration),
-        (LimitKind::Jerk, peaks.jerk),
+        (LimitKind::Velocity, all.velocity),
+        (LimitKind::Acceleration, all.acceleration),
+        (LimitKind::Jerk, all.jerk),
         (LimitKind::Feed, peaks.feed),
     ];
     let worst = kinds.iter().filter_map(|&(kind, peak)| {
@@ -211,6 +243,7 @@ fn conclude(table: &FeedTable, peaks: Peaks) -> Certificate {
         jerk_ratio,
         feed_ratio,
         holds: kinds.iter().all(|(_, p)| p.bound <= 1.0 + CERTIFICATE_RATIO),
+        axes: axes.iter().map(AxisRatios::of).collect(),
         worst: worst.collect(),
         defect: None,
     }

@@ -13,32 +13,47 @@ use super::bernstein::{
 };
 use super::hodograph::{Hodograph, Rate};
 use crate::geometry::section::SpeedCap;
-use crate::job::machine::AxisLimits;
+use crate::job::machine::{AxisLimits, MAX_AXES};
 
 /// Largest limit that is taken at its word; larger finite ones are cut to it, which is the strict side.
 const LARGEST_LIMIT: f64 = 1e15;
 /// Smaller limits, and what is not a number, admit no motion.
 const SMALLEST_LIMIT: f64 = 1e-15;
 
-/// The peaks of the four kinds.
+/// The peaks of every axis, and of the feed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Peaks {
-    pub(super) velocity: Peak,
-    pub(super) acceleration: Peak,
-    pub(super) jerk: Peak,
+    pub(super) axes: [AxisPeaks; MAX_AXES],
     pub(super) feed: Peak,
 }
 
+/// What is known of one axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AxisPeaks {
+    pub(super) velocity: Peak,
+    pub(super) acceleration: Peak,
+    pub(super) jerk: Peak,
+}
+
 impl Peaks {
-    pub(super) const NONE: Self =
-        Self { velocity: Peak::NONE, acceleration: Peak::NONE, jerk: Peak::NONE, feed: Peak::NONE };
+    pub(super) const NONE: Self = Self { axes: [AxisPeaks::NONE; MAX_AXES], feed: Peak::NONE };
+
+    pub(super) fn merge(self, other: Self) -> Self {
+        Self {
+            axes: std::array::from_fn(|a| self.axes[a].merge(other.axes[a])),
+            feed: self.feed.merge(other.feed),
+        }
+    }
+}
+
+impl AxisPeaks {
+    const NONE: Self = Self { velocity: Peak::NONE, acceleration: Peak::NONE, jerk: Peak::NONE };
 
     pub(super) fn merge(self, other: Self) -> Self {
         Self {
             velocity: self.velocity.merge(other.velocity),
             acceleration: self.acceleration.merge(other.acceleration),
             jerk: self.jerk.merge(other.jerk),
-            feed: self.feed.merge(other.feed),
         }
     }
 }
@@ -60,7 +75,7 @@ pub(super) struct CapPart {
 }
 
 /// Bounds one axis on an inner span.
-pub(super) fn inner_axis(peaks: &mut Peaks, p: &Hodograph, r: &Rate, limits: &AxisLimits, at: Locus) {
+pub(super) fn inner_axis(peaks: &mut AxisPeaks, p: &Hodograph, r: &Rate, limits: &AxisLimits, at: Locus) {
     let [m1, m2, m3] = p.size;
     let [mq, md, mg] = r.size;
     if let Some(k) = per_limit(limits.velocity) {
@@ -132,7 +147,7 @@ impl Rest {
     }
 
     /// Bounds one axis.
-    pub(super) fn axis(&self, peaks: &mut Peaks, p: &Hodograph, limits: &AxisLimits, at: Locus) {
+    pub(super) fn axis(&self, peaks: &mut AxisPeaks, p: &Hodograph, limits: &AxisLimits, at: Locus) {
         if let Some(k) = per_limit(limits.velocity) {
             let (c, slack) = self.velocity(p, k);
             peaks.velocity.climb(Form::Signed, &c, slack, at);

@@ -4,10 +4,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::{Certificate, LimitKind, TableDefect, Worst, certify, position_bounds};
+use super::{AxisRatios, Certificate, LimitKind, TableDefect, Worst, certify, position_bounds};
 use crate::analysis::inspect::span_extremes;
+use crate::feed::file::FileAxis;
 use crate::feed::job::{JobItem, PlannedSection};
-use crate::job::machine::Axis;
 use crate::job::program::MoveKind;
 use crate::tolerances::{STATED_LIMIT, TABLE_SERIES_ARGUMENT};
 
@@ -28,6 +28,8 @@ pub struct VerifyReport {
     pub jerk_ratio: f64,
     /// Worst ratio of the path speed to its cap.
     pub feed_ratio: f64,
+    /// The worst ratios of each axis.
+    pub axes: Vec<AxisRatios>,
     /// Where each kind comes nearest its limit in the whole job.
     pub worst: Vec<WorstInJob>,
     /// Number of tables.
@@ -156,7 +158,7 @@ struct TableProof {
 /// Proves every table of a job against its stated limits and those against the machine's axes.
 ///
 /// To verify a plan made without jerk limits, hand in axes whose jerk limits are infinite.
-pub fn verify(items: &[JobItem], axes: &[Axis]) -> VerifyReport {
+pub fn verify(items: &[JobItem], axes: &[FileAxis]) -> VerifyReport {
     let sections: Vec<&PlannedSection> = items
         .iter()
         .filter_map(|item| if let JobItem::Section(section) = item { Some(section) } else { None })
@@ -187,8 +189,14 @@ impl VerifyReport {
         self.acceleration_ratio = self.acceleration_ratio.max(c.acceleration_ratio);
         self.jerk_ratio = self.jerk_ratio.max(c.jerk_ratio);
         self.feed_ratio = self.feed_ratio.max(c.feed_ratio);
+        if self.axes.len() < c.axes.len() {
+            self.axes.resize(c.axes.len(), AxisRatios::default());
+        }
+        for (whole, part) in self.axes.iter_mut().zip(&c.axes) {
+            *whole = whole.max(*part);
+        }
         for &place in &c.worst {
-            let found = WorstInJob { table, line: line_at(section, place.u), place };
+            let found = WorstInJob { table, line: section.marks.line_at(place.u / section.table.path.step), place };
             match self.worst.iter_mut().find(|w| w.place.kind == place.kind) {
                 Some(held) if held.place.bound < place.bound => *held = found,
                 Some(_) => {}
@@ -216,14 +224,7 @@ impl VerifyReport {
     }
 }
 
-/// Program line at the place `u` of a section.
-fn line_at(section: &PlannedSection, u: f64) -> u32 {
-    let (blocks, step) = (&section.marks.blocks, section.table.path.step);
-    let k = blocks.partition_point(|b| (b.until as f64) * step < u);
-    blocks.get(k).or(blocks.last()).map_or(0, |b| b.line)
-}
-
-fn prove(section: &PlannedSection, axes: &[Axis]) -> TableProof {
+fn prove(section: &PlannedSection, axes: &[FileAxis]) -> TableProof {
     let PlannedSection { kind, limits, table, marks } = section;
     let certificate = certify(table, limits, &marks.caps);
     let mut faults = Vec::new();
@@ -286,7 +287,7 @@ fn prove(section: &PlannedSection, axes: &[Axis]) -> TableProof {
 fn jumps<'a>(
     before: &'a PlannedSection,
     after: &'a PlannedSection,
-    axes: &'a [Axis],
+    axes: &'a [FileAxis],
 ) -> impl Iterator<Item = FaultCause> + 'a {
     let (before, after) = (&before.table.path.axes, &after.table.path.axes);
     before.iter().zip(after).zip(axes).enumerate().filter_map(|(axis, ((a, b), machine))| {
@@ -309,8 +310,8 @@ mod tests {
     use crate::analysis::samples::{axis, back_section, bent_section};
     use crate::job::machine::{AxisKind, AxisLimits};
 
-    fn machine() -> Vec<Axis> {
-        vec![axis(AxisKind::Linear, bent_section().limits[0]); 2]
+    fn machine() -> Vec<FileAxis> {
+        vec![FileAxis::from(&axis(AxisKind::Linear, bent_section().limits[0])); 2]
     }
 
     fn job() -> Vec<JobItem> {

@@ -25,7 +25,7 @@ pub use writer::{FeedWriter, PendingFile};
 
 use super::job::JobItem;
 use super::pack::AxisScale;
-use crate::job::machine::{AxisKind, AxisLimits, Machine, Unit};
+use crate::job::machine::{Axis, AxisKind, AxisLimits, Machine, Unit};
 
 const MAGIC: [u8; 8] = *b"FEEDSPLN";
 
@@ -104,9 +104,9 @@ pub struct FeedFile {
     pub totals: Totals,
 }
 
-impl From<&Machine> for FileHeader {
-    fn from(machine: &Machine) -> Self {
-        let axes = machine.axes.iter().map(|axis| FileAxis {
+impl From<&Axis> for FileAxis {
+    fn from(axis: &Axis) -> Self {
+        Self {
             name: axis.name.clone(),
             kind: axis.kind,
             unit: axis.unit,
@@ -114,11 +114,16 @@ impl From<&Machine> for FileHeader {
             travel: axis.travel,
             limits: axis.limits,
             rapid: axis.rapid,
-        });
+        }
+    }
+}
+
+impl From<&Machine> for FileHeader {
+    fn from(machine: &Machine) -> Self {
         Self {
             name: machine.name.clone(),
             tick_ns: (machine.control_tick_s * 1e9).round() as u32,
-            axes: axes.collect(),
+            axes: machine.axes.iter().map(FileAxis::from).collect(),
         }
     }
 }

@@ -29,6 +29,14 @@ pub struct Marks {
     pub end: StopCause,
 }
 
+impl Marks {
+    /// The program line that made the place `u` [grid steps]; the last one beyond the end.
+    pub fn line_at(&self, u: f64) -> u32 {
+        let k = self.blocks.partition_point(|b| (b.until as f64) < u);
+        self.blocks.get(k).or(self.blocks.last()).map_or(0, |b| b.line)
+    }
+}
+
 /// A cap on the speed along a part of the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeedCap {
