@@ -1,6 +1,7 @@
 //! The certificate against a checker that shares no code with it.
 
-use planner::certificate::{Certificate, certify, position_bounds};
+use planner::certificate::verify::{Fault, FaultCause, WorstInJob};
+use planner::certificate::{Certificate, LimitKind, TableDefect, Worst, certify, position_bounds};
 use planner::feed::table::FeedTable;
 use planner::geometry::section::{FeedCap, SpeedCap};
 use planner::job::machine::AxisLimits;
@@ -154,4 +155,24 @@ proptest! {
             prop_assert!(high >= most - 1e-9 && high - most < 1e-2, "{high} {most}");
         }
     }
+}
+
+/// A report of faults is one flat object per fault, whatever its cause.
+#[test]
+fn faults_are_flat_json() {
+    let fault = |cause| serde_json::to_value(Fault { table: 2, line: 7, cause }).unwrap();
+    assert_eq!(
+        fault(FaultCause::Table(TableDefect::StandsStill { code: 3 })),
+        serde_json::json!({"table": 2, "line": 7, "cause": "table", "defect": "stands_still", "code": 3})
+    );
+    assert_eq!(
+        fault(FaultCause::Limit { kind: LimitKind::Jerk, ratio: 1.5 }),
+        serde_json::json!({"table": 2, "line": 7, "cause": "limit", "kind": "jerk", "ratio": 1.5})
+    );
+    assert_eq!(fault(FaultCause::Marks), serde_json::json!({"table": 2, "line": 7, "cause": "marks"}));
+    let place = Worst { kind: LimitKind::Feed, axis: 3, span: 1, u: 0.5, bound: 0.75, attained: 0.5 };
+    assert_eq!(
+        serde_json::to_value(WorstInJob { table: 0, line: 4, place }).unwrap()["kind"],
+        serde_json::json!("feed")
+    );
 }

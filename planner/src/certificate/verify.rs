@@ -74,6 +74,7 @@ pub struct Fault {
     /// First program line of it.
     pub line: u32,
     /// What is wrong.
+    #[serde(flatten)]
     pub cause: FaultCause,
 }
 

@@ -6,7 +6,7 @@ use planner::geometry::section::{FeedCap, SpeedCap};
 use planner::job::machine::AxisLimits;
 
 use super::real::Real;
-use super::spline::BSpline;
+use super::spline::{Basis, combine};
 
 /// Largest ratios value / limit met at the samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,8 +37,9 @@ pub struct Instant<T> {
 pub struct Reading<T> {
     knots: Vec<T>,
     breaks: Vec<T>,
-    rate: BSpline<T>,
-    paths: Vec<BSpline<T>>,
+    rate: (Basis<T>, Vec<T>),
+    path: Basis<T>,
+    controls: Vec<Vec<T>>,
 }
 
 impl<T: Real> Reading<T> {
@@ -64,14 +65,18 @@ impl<T: Real> Reading<T> {
         let last_rest = knots[n] - knots[n - 1];
         controls.push(tail + half * (knots[n - 1] - knots[n - 2]) * slope(tail, last_rest));
         controls.push(tail);
-        let rate = BSpline::clamped(2, &knots[1..n], controls);
+        let rate = (Basis::clamped(2, &knots[1..n]), controls);
         let breaks: Vec<T> = table.path.breaks.iter().map(|&b| place(b)).collect();
-        let path = |a: &GridAxis| {
-            let controls = a.controls.iter().map(|&c| real(c as f64) * real(a.lsb)).collect();
-            BSpline::clamped(3, &breaks, controls)
-        };
-        let paths = table.path.axes.iter().map(path).collect();
-        Self { knots, breaks, rate, paths }
+        let path = Basis::clamped(3, &breaks);
+        let axis = |a: &GridAxis| a.controls.iter().map(|&c| real(c as f64) * real(a.lsb)).collect();
+        let controls = table.path.axes.iter().map(axis).collect();
+        Self { knots, breaks, rate, path, controls }
+    }
+
+    /// q, or a derivative of it, by the polynomial of inner span `interval + 1`.
+    fn q(&self, interval: usize, u: T, derivative: usize) -> T {
+        let (basis, controls) = &self.rate;
+        combine(controls, interval, &basis.weights(interval, u, derivative))
     }
 
     /// Number of spans.
@@ -98,7 +103,7 @@ impl<T: Real> Reading<T> {
         let h = to - from;
         let last = self.spans() - 1;
         let (u, rate) = if span == 0 || span == last {
-            let q = self.rate.at(if span == 0 { 0 } else { last - 2 }, if span == 0 { to } else { from }, 0);
+            let q = if span == 0 { self.q(0, to, 0) } else { self.q(last - 2, from, 0) };
             let duration = real(3.0) * h / q.root();
             let d1 = real(3.0) * h / duration;
             let d2 = real(6.0) * h / (duration * duration);
@@ -108,18 +113,19 @@ impl<T: Real> Reading<T> {
             (u, [d1 * w * w, real(sign) * d2 * w, d3])
         } else {
             let u = from + real(s) * h;
-            let q = |d| self.rate.at(span - 1, u, d);
+            let q = |d| self.q(span - 1, u, d);
             let speed = q(0).root();
             (u, [speed, q(1) * real(0.5), q(2) * speed * real(0.5)])
         };
         let middle = 0.5 * (from + to).near();
         let geometry = self.breaks.partition_point(|b| b.near() < middle).saturating_sub(1);
         let [v, a, j] = rate;
-        let axis = |p: &BSpline<T>| {
-            let [p0, p1, p2, p3] = [0, 1, 2, 3].map(|d| p.at(geometry, u, d));
+        let weights = [0, 1, 2, 3].map(|d| self.path.weights(geometry, u, d));
+        let axis = |controls: &Vec<T>| {
+            let [p0, p1, p2, p3] = [0, 1, 2, 3].map(|d| combine(controls, geometry, &weights[d]));
             [p0, p1 * v, p2 * v * v + p1 * a, p3 * v * v * v + real(3.0) * p2 * v * a + p1 * j]
         };
-        Instant { u, rate, axes: self.paths.iter().map(axis).collect() }
+        Instant { u, rate, axes: self.controls.iter().map(axis).collect() }
     }
 }
 

@@ -2,23 +2,21 @@
 
 use super::real::Real;
 
-/// A clamped B-spline.
+/// The basis functions of clamped B-splines.
 #[derive(Clone, Debug)]
-pub struct BSpline<T> {
+pub struct Basis<T> {
     degree: usize,
     knots: Vec<T>,
-    controls: Vec<T>,
 }
 
-impl<T: Real> BSpline<T> {
+impl<T: Real> Basis<T> {
     /// With end knots repeated `degree` more times.
-    pub fn clamped(degree: usize, breaks: &[T], controls: Vec<T>) -> Self {
+    pub fn clamped(degree: usize, breaks: &[T]) -> Self {
         let (first, last) = (breaks[0], breaks[breaks.len() - 1]);
         let mut knots = vec![first; degree];
         knots.extend_from_slice(breaks);
         knots.extend(vec![last; degree]);
-        assert_eq!(controls.len() + degree + 1, knots.len());
-        Self { degree, knots, controls }
+        Self { degree, knots }
     }
 
     /// Basis function `i` of degree `p`, or a derivative of it, by the polynomial of break interval `interval`.
@@ -42,10 +40,16 @@ impl<T: Real> BSpline<T> {
             + over(t[i + p + 1] - u, fall) * self.basis(i + 1, p - 1, 0, interval, u)
     }
 
-    /// Value or derivative at `u`, by the polynomial of break interval `interval`.
-    pub fn at(&self, interval: usize, u: T, derivative: usize) -> T {
-        (interval..=interval + self.degree)
-            .map(|i| self.controls[i] * self.basis(i, self.degree, derivative, interval, u))
-            .fold(T::from(0.0), |sum, term| sum + term)
+    /// Weights of control points `interval..=interval + degree` in the value or a derivative at `u`, by the
+    /// polynomial of break interval `interval`.
+    pub fn weights(&self, interval: usize, u: T, derivative: usize) -> Vec<T> {
+        let functions = interval..=interval + self.degree;
+        functions.map(|i| self.basis(i, self.degree, derivative, interval, u)).collect()
     }
+}
+
+/// Sum of control points by weights, from control point `first` on.
+pub fn combine<T: Real>(controls: &[T], first: usize, weights: &[T]) -> T {
+    let terms = controls[first..first + weights.len()].iter().zip(weights);
+    terms.fold(T::from(0.0), |sum, (&c, &w)| sum + c * w)
 }
