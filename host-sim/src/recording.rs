@@ -11,7 +11,7 @@ use crate::reference::PlannedMotion;
 use crate::report::AxisReport;
 use crate::setpoint_hash::SetpointHash;
 use crate::statistics::{ContourError, Magnitude};
-use crate::trace::{AxisSample, TraceHeader, TraceRow, TraceSink};
+use crate::trace::{AxisSample, Place, TraceHeader, TraceRow, TraceSink};
 
 /// The axes with their servos and plants, the oracle of the plan, and the statistics of both.
 ///
@@ -25,6 +25,8 @@ pub struct Recording<'a> {
     present: Vec<CountSetpoint>,
     samples: Vec<AxisSample>,
     motion: Option<PlannedMotion<'a>>,
+    tables: usize,
+    place: Option<Place>,
     hash: SetpointHash,
     deviation: Vec<f64>,
     contour: ContourError,
@@ -54,6 +56,8 @@ impl<'a> Recording<'a> {
             deviation: vec![0.0; loops.len()],
             loops,
             motion: None,
+            tables: 0,
+            place: None,
             hash: SetpointHash::default(),
             contour: ContourError::default(),
             contour_error: Magnitude::default(),
@@ -82,6 +86,7 @@ impl<'a> Recording<'a> {
     /// From now on set-points are compared with `table`.
     pub fn begin_table(&mut self, table: &'a FeedTable) {
         self.motion = Some(PlannedMotion::new(table));
+        self.tables += 1;
     }
 
     /// Takes in the set-points of the coming tick, `playing` ticks after their table began if one is played, and
@@ -103,7 +108,10 @@ impl<'a> Recording<'a> {
         }
         self.present.copy_from_slice(next);
         self.measure_contour();
-        let row = TraceRow { tick: self.ticks, time_s: self.ticks as f64 * self.tick_s, axes: &self.samples };
+        // The samples are of the set-points taken in one tick ago.
+        let (tick, place) = (self.ticks, self.place);
+        self.place = playing.map(|tick| Place { table: self.tables - 1, time_s: tick as f64 * self.tick_s });
+        let row = TraceRow { tick, time_s: tick as f64 * self.tick_s, place, axes: &self.samples };
         self.ticks += 1;
         sink.row(&row)
     }

@@ -32,8 +32,19 @@ pub struct TraceRow<'a> {
     pub tick: u64,
     /// The same in seconds.
     pub time_s: f64,
+    /// Which part of the job the set-points belong to; `None` while the drives stand.
+    pub place: Option<Place>,
     /// The axes, in the machine's order.
     pub axes: &'a [AxisSample],
+}
+
+/// A place in a job.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Index of the table among the job's tables.
+    pub table: usize,
+    /// Time since its start [s].
+    pub time_s: f64,
 }
 
 /// What a sink may know before the first row.

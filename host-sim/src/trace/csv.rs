@@ -100,7 +100,7 @@ mod tests {
         trace.begin(&header(ticks)).unwrap();
         for tick in 0..ticks {
             let axes = [AxisSample { position: tick as f64, effort: -1.5, ..AxisSample::default() }; 2];
-            trace.row(&TraceRow { tick, time_s: tick as f64 * 1e-3, axes: &axes }).unwrap();
+            trace.row(&TraceRow { tick, time_s: tick as f64 * 1e-3, place: None, axes: &axes }).unwrap();
         }
         trace.end().unwrap();
         String::from_utf8(trace.into_inner()).unwrap().lines().map(String::from).collect()

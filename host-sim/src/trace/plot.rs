@@ -162,7 +162,7 @@ mod tests {
         };
         for tick in 0..100_003u64 {
             let axes = [AxisSample { effort: spike(tick), ..AxisSample::default() }];
-            plot.row(&TraceRow { tick, time_s: 0.0, axes: &axes }).unwrap();
+            plot.row(&TraceRow { tick, time_s: 0.0, place: None, axes: &axes }).unwrap();
         }
         let efforts: Vec<Extremes> = plot.axes()[0].series(Quantity::Effort).collect();
         assert!(efforts.len() <= 100 && efforts.len() > 50);
