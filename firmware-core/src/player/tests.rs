@@ -85,7 +85,7 @@ fn memory_that_changes_under_a_running_table_is_a_fault_that_stays() {
     let stopped = (0..100_000).map(|_| player.tick()).find(|setpoint| setpoint.done).unwrap();
     assert!(stopped.position < 8100);
     let status = player.status();
-    let truncated =
+    let malformed =
         matches!(status.fault, Some(Fault::Table { table: 4, error: TableError::Malformed { .. } }));
     assert!(status.state == State::Fault && malformed, "{status:?}");
     let _ready = player.poll_answer();
