@@ -277,9 +277,8 @@ fn a_weak_motor_saturates_and_says_so() {
 #[test]
 fn traces_hold_every_tick_or_as_many_as_asked() {
     let (job, machine, settings) = (job(), machine(), SimSettings::default());
-    let mut sinks = (CsvTrace::new(Vec::new(), Rows::All), PlotTrace::new(500));
-    let report = simulate(&job, &machine, &settings, &mut sinks, &mut |_| {}).unwrap();
-    let (csv, plot) = sinks;
+    let (mut csv, mut plot) = (CsvTrace::new(Vec::new(), Rows::All), PlotTrace::new(500));
+    let report = simulate(&job, &machine, &settings, &mut (&mut csv, &mut plot), &mut |_| {}).unwrap();
     let text = String::from_utf8(csv.into_inner()).unwrap();
     assert_eq!(text.lines().count() as u64, 1 + report.ticks);
     let peak = |m: f64, e: host_sim::trace::Extremes| m.max(e.max).max(-e.min);
