@@ -367,3 +367,6 @@ fn is_within(table: &Limits, drive: &Limits) -> bool {
     };
     table.velocity <= drive.velocity && table.acceleration <= drive.acceleration && jerk
 }
+
+#[cfg(test)]
+mod tests;

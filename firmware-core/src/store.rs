@@ -173,3 +173,11 @@ impl Table {
         self.shared.seal.is_some() && self.controls.seal.is_some()
     }
 }
+
+#[cfg(test)]
+impl Slot<'_> {
+    /// Overwrites the table's bytes, as a memory error would.
+    pub(crate) fn corrupt(&mut self) {
+        self.memory.fill(0xff);
+    }
+}

@@ -9,7 +9,7 @@ use planner::feed::messages::frames;
 use planner::feed::pack::Packed;
 use planner::feed::table::FeedTable;
 use protocol::bus::{Frame, FrameSize, Node, Reassembler, ids};
-use protocol::message::{DriveMessage, HostMessage, Part, Reject, State, decode};
+use protocol::message::{DriveMessage, HostMessage, Part, Reject, State, decode, encode};
 use protocol::table::{HeaderField, Limits, TableError, TableHeader};
 use tests::tables::{COARSE, Kind, Random, Sample, TICK_NS};
 
@@ -317,6 +317,15 @@ fn status_comes_at_its_period() {
     assert_eq!((first.state, first.tick, first.position), (State::Idle, 20, start_of(&packed)));
 }
 
+/// A header with one bit of its bytes changed, if that is a header.
+fn mutated(header: &TableHeader, random: &mut Random) -> Option<TableHeader> {
+    let mut buffer = [0; 64];
+    let mut bytes = encode(header, &mut buffer).unwrap().to_vec();
+    let at = random.whole(0, bytes.len() as u64 - 1) as usize;
+    bytes[at] ^= 1 << random.whole(0, 7);
+    decode(&bytes).ok()
+}
+
 #[test]
 fn mutated_tables_are_refused_or_play_to_their_declared_end() {
     let mut random = Random::new(50);
@@ -329,6 +338,10 @@ fn mutated_tables_are_refused_or_play_to_their_declared_end() {
             let bytes = if random.whole(0, 1) == 0 { &mut packed.shared } else { &mut axis.controls };
             let at = random.whole(0, bytes.len() as u64 - 1) as usize;
             bytes[at] ^= 1 << random.whole(0, 7);
+        }
+        if random.whole(0, 3) == 0 {
+            let Some(header) = mutated(&packed.header, &mut random) else { continue };
+            packed.header = header;
         }
         let part = &packed.axes[0];
         let view = TableView::new(packed.header, part.header, &packed.shared, &part.controls);

@@ -106,6 +106,38 @@ fn the_last_setpoint_is_the_exact_end_and_the_first_the_exact_start() {
 }
 
 #[test]
+fn motion_is_continuous_at_every_knot() {
+    let mut random = Random::new(8);
+    let mut knots = 0;
+    for _ in 0..100 {
+        let sample = Sample::new(&mut random, FINE);
+        let packed = sample.packed(1).unwrap();
+        let table = checked(&packed, 0);
+        let mut cursor = Cursor::new(&table).unwrap();
+        let (mut fastest, mut hardest, mut pairs) = (0f32, 0f32, Vec::new());
+        while cursor.span() + 1 < packed.header.spans {
+            let knot = cursor.began() + cursor.duration();
+            let before = cursor.evaluate(&table, knot - 1).unwrap();
+            let after = cursor.evaluate(&table, knot).unwrap();
+            assert_eq!(cursor.began(), knot);
+            fastest = fastest.max(after.velocity.abs());
+            hardest = hardest.max(after.acceleration.abs());
+            pairs.push((before, after));
+        }
+        knots += pairs.len();
+        for (before, after) in pairs {
+            assert!((after.position - before.position).abs() <= 1, "{before:?} {after:?}");
+            assert!((after.velocity - before.velocity).abs() <= 2e-6 * fastest, "{before:?} {after:?}");
+            assert!(
+                (after.acceleration - before.acceleration).abs() <= 2e-5 * hardest,
+                "{before:?} {after:?}"
+            );
+        }
+    }
+    assert!(knots > 4000);
+}
+
+#[test]
 fn setpoints_do_not_depend_on_which_instants_were_asked_before() {
     let mut random = Random::new(4);
     for _ in 0..50 {
@@ -119,6 +151,20 @@ fn setpoints_do_not_depend_on_which_instants_were_asked_before() {
             assert_eq!(once.evaluate(&table, time), often.evaluate(&table, time));
         }
     }
+}
+
+#[test]
+fn a_table_takes_as_long_as_the_law_says() {
+    let mut random = Random::new(7);
+    let mut worst = 0f64;
+    for _ in 0..200 {
+        let sample = Sample::new(&mut random, FINE);
+        let packed = sample.packed(1).unwrap();
+        let seconds = checked(&packed, 0).duration() as f64 / UNIT;
+        worst = worst.max((seconds / sample.table.duration() - 1.0).abs());
+    }
+    assert!(worst < 1e-6, "{worst:e}");
+    println!("{worst:e}");
 }
 
 #[test]

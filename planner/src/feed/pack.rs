@@ -66,7 +66,7 @@ pub enum PackError {
     #[error("the table's {0} do not fit together")]
     Shape(&'static str),
     /// The grid step is no power of two in range.
-    #[error("a grid step of {step} is not a power of two between 2^-48 and 2^16")]
+    #[error("a grid step of {step} is not a power of two between 2^-32 and 2^16")]
     Step {
         /// The step [u].
         step: f64,

@@ -37,7 +37,7 @@ impl Frame {
         }
         let length = wire_length(bytes.len())?;
         let mut data = [0; 64];
-        data.get_mut(..bytes.len())?.copy_from_slice(bytes);
+        data.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
         Some(Self { id, length, data })
     }
 

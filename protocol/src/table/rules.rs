@@ -28,8 +28,9 @@ pub const MAX_GEOMETRY_LENGTH: u32 = 1 << 29;
 /// Most fraction bits of a control point.
 pub const MAX_FRACTION_BITS: u8 = 12;
 
-/// Range of the grid step's exponent: one step is 2^e u.
-pub const STEP_EXPONENT: core::ops::RangeInclusive<i8> = -48..=16;
+/// Range of the grid step's exponent: one step is 2^e u. Within it no coefficient of a piece overflows f32: the
+/// largest is the third one, about 2^23 counts / u^3 of a span of one step.
+pub const STEP_EXPONENT: core::ops::RangeInclusive<i8> = -32..=16;
 
 /// The whole count nearest to a control point; halves go up.
 pub const fn nearest_count(control: i64, fraction_bits: u8) -> i64 {

@@ -111,7 +111,7 @@ fn header_fields_are_checked_by_name() {
         (TableHeader { spans: 4, ..good }, HeaderField::Spans),
         (TableHeader { geometry_spans: 0, ..good }, HeaderField::GeometrySpans),
         (TableHeader { geometry_spans: 6, ..good }, HeaderField::Spans),
-        (TableHeader { step_exponent: -49, ..good }, HeaderField::StepExponent),
+        (TableHeader { step_exponent: -33, ..good }, HeaderField::StepExponent),
         (TableHeader { q_scale: f32::NAN, ..good }, HeaderField::QScale),
         (TableHeader { q_scale: f32::INFINITY, ..good }, HeaderField::QScale),
         (TableHeader { q_scale: 0.0, ..good }, HeaderField::QScale),
