@@ -113,3 +113,49 @@ impl AxisLoop {
         if self.ticks == 0 { 0.0 } else { self.saturated_ticks as f64 / self.ticks as f64 }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis_scale::tests::axis;
+    use planner::job::machine::{AxisKind, Unit};
+
+    /// Half a second back and forth, starting from `origin` [counts].
+    fn swing(origin: i64) -> (AxisLoop, Vec<AxisSample>) {
+        let at = |k: i32| {
+            let w = core::f64::consts::TAU / 250.0;
+            let a = w * f64::from(k);
+            let (rate, tick) = (w * 1000.0, 2000.0);
+            CountSetpoint {
+                position: origin + (tick * (1.0 - a.cos())).round() as i64,
+                velocity: (tick * rate * a.sin()) as f32,
+                acceleration: (tick * rate * rate * a.cos()) as f32,
+            }
+        };
+        let mut axis = AxisLoop::new(&axis(AxisKind::Linear, Unit::Mm, 1000.0), 1e-3, origin).unwrap();
+        let samples = (0..500).map(|k| axis.tick(&at(k), &at(k + 1))).collect();
+        (axis, samples)
+    }
+
+    #[test]
+    fn errors_do_not_depend_on_where_the_axis_is() {
+        let ((_, near), (_, far)) = (swing(0), swing(123_456_789_012));
+        for (a, b) in near.iter().zip(&far) {
+            assert_eq!((a.following_error, a.effort), (b.following_error, b.effort));
+        }
+    }
+
+    #[test]
+    fn samples_are_in_axis_units_and_make_up_the_statistics() {
+        let (axis, samples) = swing(1000);
+        assert!((samples[125].position - 5.0).abs() < 1e-9);
+        let peak = samples.iter().fold(0.0f64, |m, s| m.max(s.velocity));
+        assert!((peak - 2.0 * core::f64::consts::TAU * 4.0).abs() < 0.1, "{peak} mm/s");
+        for s in &samples {
+            assert!((s.position - s.actual - s.following_error).abs() < 1e-12);
+        }
+        let mean = samples.iter().map(|s| s.following_error.powi(2)).sum::<f64>() / 500.0;
+        assert!((axis.following().rms() / mean.sqrt() - 1.0).abs() < 1e-9);
+        assert!(axis.effort().max() <= 50.0);
+    }
+}

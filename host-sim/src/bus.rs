@@ -61,29 +61,3 @@ pub trait Bus {
     /// What has crossed so far.
     fn traffic(&self) -> Traffic;
 }
-
-impl<B: Bus + ?Sized> Bus for &mut B {
-    fn attach(&mut self) -> NodeIndex {
-        (**self).attach()
-    }
-
-    fn send(&mut self, node: NodeIndex, frame: Frame, now: Nanoseconds) {
-        (**self).send(node, frame, now);
-    }
-
-    fn advance(&mut self, until: Nanoseconds) {
-        (**self).advance(until);
-    }
-
-    fn receive(&mut self, node: NodeIndex) -> Option<Received> {
-        (**self).receive(node)
-    }
-
-    fn waiting(&self, node: NodeIndex) -> usize {
-        (**self).waiting(node)
-    }
-
-    fn traffic(&self) -> Traffic {
-        (**self).traffic()
-    }
-}

@@ -9,8 +9,10 @@ use firmware_core::player::AxisConfig;
 use planner::feed::job::{JobItem, PlannedSection};
 use planner::feed::pack::{AxisScale, limits_in_counts, pack};
 use planner::feed::table::FeedTable;
-use planner::job::machine::{AxisLimits, Machine};
+use planner::geometry::grid_path::GridAxis;
+use planner::job::machine::{Axis, AxisLimits, Machine};
 use protocol::bus::Node;
+use protocol::table::rules::MAX_FRACTION_BITS;
 
 use crate::axis_loop::CountSetpoint;
 use crate::bus::{Bus, InProcessBus, Lossy, Traffic};
@@ -186,7 +188,7 @@ impl<'a> Programme<'a> {
     fn add_section(&mut self, section: &'a PlannedSection) -> Result<(), SimError> {
         let number = self.orders.len() as u32;
         let refuse = |source| SimError::Pack { table: number, source };
-        let scale = |(axis, limits): (&planner::job::machine::Axis, &AxisLimits)| AxisScale {
+        let scale = |(axis, limits): (&Axis, &AxisLimits)| AxisScale {
             counts_per_unit: axis.counts_per_unit,
             limits: *limits,
         };
@@ -289,11 +291,14 @@ impl<'a> Programme<'a> {
     }
 }
 
-/// The last control points of a table [counts], by way of axis units: the drives' own numbers play no part.
+/// The last control points of a table to whole counts, halves up, as the format has it.
 fn programmed_end(table: &FeedTable, machine: &Machine) -> Vec<i64> {
-    let end = |(path, axis): (&planner::geometry::grid_path::GridAxis, &planner::job::machine::Axis)| {
+    // Control points are whole multiples of a count's 2^-f: what lies between is rounding of the two factors.
+    let finest = f64::from(1u32 << MAX_FRACTION_BITS);
+    let end = |(path, axis): (&GridAxis, &Axis)| {
         let last = path.controls.last().copied().unwrap_or(0);
-        (last as f64 * (path.lsb * axis.counts_per_unit)).round() as i64
+        let counts = last as f64 * (path.lsb * axis.counts_per_unit);
+        ((counts * finest).round() / finest + 0.5).floor() as i64
     };
     table.path.axes.iter().zip(&machine.axes).map(end).collect()
 }

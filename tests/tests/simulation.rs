@@ -279,9 +279,8 @@ fn a_weak_motor_saturates_and_says_so() {
 #[test]
 fn traces_hold_every_tick_or_as_many_as_asked() {
     let (job, machine, settings) = (job(), machine(), SimSettings::default());
-    let mut sinks = (CsvTrace::new(Vec::new(), Rows::All), PlotTrace::new(500));
-    let report = simulate(&job, &machine, &settings, &mut sinks, &mut |_| {}).unwrap();
-    let (csv, plot) = sinks;
+    let (mut csv, mut plot) = (CsvTrace::new(Vec::new(), Rows::All), PlotTrace::new(500));
+    let report = simulate(&job, &machine, &settings, &mut (&mut csv, &mut plot), &mut |_| {}).unwrap();
     let text = String::from_utf8(csv.into_inner()).unwrap();
     assert_eq!(text.lines().count() as u64, 1 + report.ticks);
     let peak = |m: f64, e: host_sim::trace::Extremes| m.max(e.max).max(-e.min);
@@ -323,6 +322,34 @@ fn simulation_is_much_faster_than_the_machine() {
     assert!(report.at_end && report.cycle_time_s > 110.0);
     assert!(speed > 20.0, "{speed} times real time");
     println!("{speed:.0} times real time");
+}
+
+#[test]
+fn tables_shorter_than_their_sending_wait_for_the_bus_and_say_so() {
+    let out = section(0.5, 50.0, |u| [u, 0.0, 0.0]);
+    let reach = end_of(&out)[0];
+    let back = section(0.5, 50.0, |u| [reach - u, 0.0, 0.0]);
+    let mut job: Vec<JobItem> =
+        (0..12).map(|i| JobItem::Section(if i % 2 == 0 { out.clone() } else { back.clone() })).collect();
+    job.push(JobItem::Dwell { seconds: 0.1, line: 9 });
+    let slow = BitTiming { nominal: 125_000, ..BitTiming::default() };
+    let report = attempt(&job, &machine(), &SimSettings { bus: slow, ..SimSettings::default() }).unwrap();
+    assert!(report.at_end && report.dwell_s == 0.1);
+    assert!(report.handover_s > 12.0 * 0.02, "{} s", report.handover_s);
+    let quick = attempt(&job, &machine(), &SimSettings::default()).unwrap();
+    assert!(quick.handover_s < report.handover_s && quick.setpoint_hash == report.setpoint_hash);
+}
+
+#[test]
+fn the_end_point_is_rounded_as_the_format_says() {
+    // Control points are sixteenths of a count; the half of a negative count goes up as that of a positive one.
+    let mut section = section(10.0, 50.0, |u| [-u, u, 0.0]);
+    let last = section.table.path.axes[0].controls.len() - 1;
+    section.table.path.axes[0].controls[last] = -16 * 9900 - 8;
+    section.table.path.axes[1].controls[last] = 16 * 9900 + 8;
+    let report = attempt(&[JobItem::Section(section)], &machine(), &SimSettings::default()).unwrap();
+    assert!(report.at_end);
+    assert_eq!((report.axes[0].end_counts, report.axes[1].end_counts), (-9900, 9901));
 }
 
 #[test]
