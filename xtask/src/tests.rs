@@ -32,12 +32,12 @@ impl Tally {
                     _ => {}
                 }
             }
-        } else if let Some((name, verdict)) = line.strip_prefix("test ").and_then(|l| l.split_once(" ... ")) {
-            if let Some(reason) = verdict.strip_prefix("ignored") {
-                let reason = reason.trim_start_matches([',', ' ']);
-                let reason = if reason.is_empty() { "no reason given" } else { reason };
-                self.skipped.push(format!("{name}: {reason}"));
-            }
+        } else if let Some((name, verdict)) = line.strip_prefix("test ").and_then(|l| l.split_once(" ... "))
+            && let Some(reason) = verdict.strip_prefix("ignored")
+        {
+            let reason = reason.trim_start_matches([',', ' ']);
+            let reason = if reason.is_empty() { "no reason given" } else { reason };
+            self.skipped.push(format!("{name}: {reason}"));
         }
     }
 
