@@ -1,7 +1,7 @@
 //! Writes reports of made-up jobs, to look at: `cargo run -p cli --example sample_report -- DIR`.
 
-#[path = "../tests/sample/mod.rs"]
-#[allow(dead_code)]
+#[path = "../tests/suite/sample.rs"]
+#[allow(dead_code, reason = "the tests use more of it")]
 mod sample;
 
 use std::path::PathBuf;

@@ -78,7 +78,7 @@ pub struct PlanArgs {
     /// Machine file; a built-in 3-axis mill without it
     #[arg(long, value_name = "FILE")]
     pub machine: Option<PathBuf>,
-    /// Folder for the results [default: out/<name of the job>]
+    /// Folder for the results; out/ and the job's name without it
     #[arg(long, short, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Path tolerance, instead of the program's and the machine's

@@ -43,10 +43,10 @@ impl<'a> Console<'a> {
 
     /// Shows a failure: a diagnostic on standard error, and in JSON mode the error object on standard output.
     pub fn fail(&mut self, failure: &Failure) {
-        if self.talk.json {
-            if let Ok(line) = serde_json::to_string_pretty(&ErrorJson::from(failure)) {
-                let _ = writeln!(self.out, "{line}");
-            }
+        if self.talk.json
+            && let Ok(line) = serde_json::to_string_pretty(&ErrorJson::from(failure))
+        {
+            let _ = writeln!(self.out, "{line}");
         }
         let theme = if std::io::IsTerminal::is_terminal(&std::io::stderr()) {
             GraphicalTheme::unicode()

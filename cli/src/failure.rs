@@ -33,7 +33,7 @@ pub struct Failure {
     /// The file it was found in.
     pub file: Option<PathBuf>,
     /// The place in that file.
-    pub place: Option<Place>,
+    pub place: Option<Box<Place>>,
 }
 
 /// A place in an input file.
@@ -111,7 +111,7 @@ impl Failure {
 
     /// Adds the file and the place in it.
     pub fn at(mut self, path: &Path, place: Place) -> Self {
-        self.place = Some(place);
+        self.place = Some(Box::new(place));
         self.in_file(path)
     }
 

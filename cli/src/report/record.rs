@@ -152,19 +152,20 @@ impl Recorder {
     /// Grows, closes or opens the slow place that the instant belongs to.
     fn follow_slow(&mut self, now: &Instant<'_>, point: &PicturePoint, step: f64, moved: f64) {
         let feed = now.feed.filter(|_| point.slow);
-        if let Some(open) = &mut self.open {
-            if feed == Some(open.programmed) && open.limit == now.limit {
-                open.last_line = now.line;
-                open.length_mm += moved;
-                open.lost_s += step - moved / open.programmed;
-                // Until the place is closed `mean` holds its duration.
-                open.mean += step;
-                if now.speed < open.lowest {
-                    open.lowest = now.speed;
-                    open.at = point.at;
-                }
-                return;
+        if let Some(open) = &mut self.open
+            && feed == Some(open.programmed)
+            && open.limit == now.limit
+        {
+            open.last_line = now.line;
+            open.length_mm += moved;
+            open.lost_s += step - moved / open.programmed;
+            // Until the place is closed `mean` holds its duration.
+            open.mean += step;
+            if now.speed < open.lowest {
+                open.lowest = now.speed;
+                open.at = point.at;
             }
+            return;
         }
         self.close_slow();
         if let Some(programmed) = feed.filter(|f| *f > 0.0) {
@@ -241,10 +242,10 @@ impl Recorder {
     /// The motion recorded.
     pub fn finish(mut self) -> Motion {
         self.close_slow();
-        if let Some(last) = self.last {
-            if self.points.last() != Some(&last) {
-                self.points.push(last);
-            }
+        if let Some(last) = self.last
+            && self.points.last() != Some(&last)
+        {
+            self.points.push(last);
         }
         let mut shares: Vec<Share> =
             self.shares.iter().map(|(&limit, &seconds)| Share { limit, seconds }).collect();

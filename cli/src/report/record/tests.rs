@@ -74,7 +74,7 @@ fn extremes_survive_a_long_record_and_sizes_stay_bounded() {
 
 #[test]
 fn only_the_most_costly_places_are_listed() {
-    let motion = drive(100_000, 20.0, |t| if (t * 10.0) as u64 % 3 == 0 { 10.0 } else { 20.0 });
+    let motion = drive(100_000, 20.0, |t| if ((t * 10.0) as u64).is_multiple_of(3) { 10.0 } else { 20.0 });
     assert_eq!(motion.slow.places.len(), PLACES);
     assert!(motion.slow.others > 200, "{}", motion.slow.others);
     assert!(motion.slow.places.windows(2).all(|w| w[0].lost_s >= w[1].lost_s));

@@ -1,12 +1,10 @@
 //! The report as a file: complete, self-contained, bounded, safe against what programs hold.
 
-mod sample;
-
+use crate::sample::{self, Kind};
 use cli::json::NoteJson;
 use cli::report::model::{AxisTraces, Limit, Mode, Report};
 use cli::report::page;
 use cli::report::record::{AxisInstant, DriveInstant, Instant, Recorder};
-use sample::Kind;
 
 const ALL: [Kind; 4] = [Kind::Space, Kind::Flat, Kind::Rotary, Kind::Slide];
 

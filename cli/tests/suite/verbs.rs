@@ -1,7 +1,5 @@
 //! The verbs on a scripted engine: files, streams, exit status, JSON.
 
-mod sample;
-
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -12,6 +10,8 @@ use cli::failure::{Failure, Place};
 use cli::json::{AxisRatiosJson, CertificateJson, InspectAxisJson, InspectJson, VerifyJson};
 use cli::progress::Progress;
 use serde_json::Value;
+
+use crate::sample;
 
 /// An engine that answers as told.
 struct Scripted {
@@ -196,7 +196,7 @@ fn field_names_of_verify_and_inspect_are_pinned() {
 
 #[test]
 fn every_field_is_explained_in_the_documentation() {
-    let text = include_str!("../../docs/json.md");
+    let text = include_str!("../../../docs/json.md");
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().to_str().unwrap();
     fn check(value: &Value, text: &str) {
