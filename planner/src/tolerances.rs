@@ -26,3 +26,9 @@ pub const ARC_REACH_MM: f64 = 0.00127;
 
 /// Least radius of an arc [mm]: a nanometre is below the resolution of every machine.
 pub const ARC_RADIUS_LEAST_MM: f64 = 1e-6;
+
+/// Largest radius of an arc [mm]: above ten kilometres, centre and radius no longer give positions to a nanometre.
+pub const ARC_RADIUS_MOST_MM: f64 = 1e7;
+
+/// Feeds up to this are zero [1/min or program units/s]: times and speeds stay finite and positive.
+pub const FEED_LEAST: f64 = 1e-9;

@@ -69,6 +69,10 @@ const REFUSED: &[(&str, u32, u32, &str)] = &[
     ("F50 G2 X10", 1, 5, "arc has neither centre (I J) nor"),
     ("F50 G18 G2 X10", 1, 9, "arc has neither centre (I K) nor"),
     ("F50 G2 X10 R0", 1, 5, "arc radius is zero"),
+    ("F50 G2 X1 I99999999", 1, 5, "arc radius 9.9999999e7 mm is too large"),
+    ("F50 G2 X1 R99999999", 1, 5, "arc radius 9.9999999e7 mm is too large"),
+    ("F9999999999999 G1 X1", 1, 1, "the number of F is too large"),
+    ("G93 F0.0000000000001 G1 X1", 1, 5, "feed rate is zero"),
     ("F50 G2 X10 I0 J0", 1, 5, "arc radius is zero"),
     ("F50 G2 X0 Y0 R3", 1, 5, "arc given by R ends where it starts"),
     ("F50 G2 X10 I5 R5", 1, 15, "arc has both"),
@@ -99,6 +103,16 @@ fn every_mistake_has_its_place_and_help() {
         assert!(shown.starts_with(&start), "{text:?}: {shown}");
         assert!(error.help().is_some_and(|h| !h.to_string().is_empty()), "{text:?}");
     }
+}
+
+#[test]
+fn long_numbers_are_refused_not_overflowed() {
+    let nines = "9".repeat(400);
+    let zeros = "0".repeat(400);
+    for text in [format!("G0 X{nines}"), format!("F1 G2 X1 I{nines}"), format!("G93 F0.{zeros}1 G1 X1")] {
+        refused(&text);
+    }
+    assert_eq!(ends(&format!("G0 X0.{zeros}1Y1")), [[0.0, 1.0, 0.0]]);
 }
 
 #[test]
