@@ -142,6 +142,9 @@ fn garbage_without_end_is_refused_at_once() {
     let mut program = Program::new(zeros, "zeros", &mill(), Options::default());
     let error = program.next().unwrap().unwrap_err();
     assert_eq!((error.kind(), error.line()), (&ErrorKind::Binary { byte: 0 }, Some(1)));
+    let mut shown = String::new();
+    miette::NarratableReportHandler::new().render_report(&mut shown, &error).unwrap();
+    assert!(!shown.contains('\0'));
     let digits = std::io::BufReader::new((&b"G1 X"[..]).chain(std::io::repeat(b'7')));
     let error = Program::new(digits, "digits", &mill(), Options::default()).next().unwrap().unwrap_err();
     assert!(matches!(error.kind(), ErrorKind::LineTooLong { .. }));
