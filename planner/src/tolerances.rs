@@ -78,3 +78,9 @@ pub const FORMAT_MARGIN: f64 = 1e-6;
 /// A move also has to be below this share of a drive count to count as zero: far from the origin
 /// [`ZERO_LENGTH`] alone would swallow counts.
 pub const ZERO_COUNT: f64 = 1e-3;
+
+/// Largest radius of an arc [mm]: above ten kilometres, centre and radius no longer give positions to a nanometre.
+pub const ARC_RADIUS_MOST_MM: f64 = 1e7;
+
+/// Feeds up to this are zero [1/min or program units/s]: times and speeds stay finite and positive.
+pub const FEED_LEAST: f64 = 1e-9;

@@ -5,7 +5,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use super::fault::ErrorKind;
 use crate::job::program::Arc;
 use crate::tolerances::{
-    ARC_RADII_MM, ARC_RADII_MOST_MM, ARC_RADII_RATIO, ARC_RADIUS_LEAST_MM, ARC_REACH_MM, SAME_POINT,
+    ARC_RADII_MM, ARC_RADII_MOST_MM, ARC_RADII_RATIO, ARC_RADIUS_LEAST_MM, ARC_RADIUS_MOST_MM, ARC_REACH_MM,
+    SAME_POINT,
 };
 
 /// What fixes the circle, besides its start and end.
@@ -37,6 +38,9 @@ pub(super) fn arc(
             if radius < ARC_RADIUS_LEAST_MM || end_radius < ARC_RADIUS_LEAST_MM {
                 return Err(ErrorKind::ZeroRadius);
             }
+            if radius > ARC_RADIUS_MOST_MM {
+                return Err(ErrorKind::RadiusTooLarge { radius_mm: radius });
+            }
             let allowed_mm = (ARC_RADII_RATIO * radius).clamp(ARC_RADII_MM, ARC_RADII_MOST_MM);
             if (end_radius - radius).abs() > allowed_mm {
                 return Err(ErrorKind::RadiiDiffer { start_mm: radius, end_mm: end_radius, allowed_mm });
@@ -63,6 +67,9 @@ pub(super) fn arc(
             let half_chord = 0.5 * dx.hypot(dy);
             if given < ARC_RADIUS_LEAST_MM {
                 return Err(ErrorKind::ZeroRadius);
+            }
+            if given > ARC_RADIUS_MOST_MM {
+                return Err(ErrorKind::RadiusTooLarge { radius_mm: given });
             }
             if 2.0 * half_chord <= SAME_POINT * (size + given) {
                 return Err(ErrorKind::RadiusFullCircle);

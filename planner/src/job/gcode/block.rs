@@ -6,6 +6,9 @@ use super::Dialect;
 use super::code::{Code, GROUPS, Group, PrinterCode, group_of, printer_code};
 use super::fault::{ErrorKind, Fault};
 
+/// Largest magnitude of a number: products of a few of them stay far inside the range of f64.
+const NUMBER_LIMIT: f64 = 1e12;
+
 /// A G or M code with its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CodeWord {
@@ -208,6 +211,9 @@ impl Block {
             Err(NumberFault::Malformed(end)) => {
                 return Err(ErrorKind::MalformedNumber { letter: shown }.at(place(end).0, place(end).1));
             }
+            Err(NumberFault::TooLarge(end)) => {
+                return Err(ErrorKind::NumberTooLarge { letter: shown }.at(place(end).0, place(end).1));
+            }
             Err(NumberFault::Parameter(end)) => return Err(ErrorKind::Parameter.at(end as u32, 1)),
             Err(NumberFault::Expression(end)) => return Err(ErrorKind::Expression.at(end as u32, 1)),
             Err(NumberFault::Missing) if letter == b'O' => return Err(ErrorKind::OWord.at(at as u32, 1)),
@@ -324,8 +330,9 @@ impl Block {
         // Signs and points in wrong places are refused by the conversion.
         let value = std::str::from_utf8(digits).ok().and_then(|text| text.parse::<f64>().ok());
         match value {
-            Some(value) if value.is_finite() => Ok((value, end)),
-            _ => Err(NumberFault::Malformed(end)),
+            Some(value) if value.abs() <= NUMBER_LIMIT => Ok((value, end)),
+            Some(_) => Err(NumberFault::TooLarge(end)),
+            None => Err(NumberFault::Malformed(end)),
         }
     }
 }
@@ -333,6 +340,7 @@ impl Block {
 enum NumberFault {
     Missing,
     Malformed(usize),
+    TooLarge(usize),
     Parameter(usize),
     Expression(usize),
 }

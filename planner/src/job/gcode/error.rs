@@ -52,7 +52,11 @@ impl ProgramError {
         let end = (start + fault.length as usize).min(text.len());
         let skipped = start.saturating_sub(SNIPPET_REACH);
         let shown_end = (end.max(start) + SNIPPET_REACH).min(text.len());
-        let shown = |from: usize, to: usize| String::from_utf8_lossy(&text[from..to]).into_owned();
+        // Control characters of a binary file stay away from the terminal.
+        let plain = |c: char| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c };
+        let shown = |from: usize, to: usize| -> String {
+            String::from_utf8_lossy(&text[from..to]).replace('\t', " ").chars().map(plain).collect()
+        };
         let (before, marked, after) = (shown(skipped, start), shown(start, end), shown(end, shown_end));
         let snippet = Snippet {
             name: name.to_owned(),

@@ -49,6 +49,9 @@ pub enum ErrorKind {
     /// A number that is none.
     #[error("the number of {letter} cannot be read")]
     MalformedNumber { letter: char },
+    /// A number beyond all machines.
+    #[error("the number of {letter} is too large")]
+    NumberTooLarge { letter: char },
     /// A comment that never ends.
     #[error("comment is not closed")]
     UnclosedComment,
@@ -148,6 +151,9 @@ pub enum ErrorKind {
     /// A radius that does not reach the end point.
     #[error("arc radius {radius_mm:.4} mm is too small: the end is {:.4} mm away", 2.0 * half_chord_mm)]
     RadiusTooSmall { radius_mm: f64, half_chord_mm: f64 },
+    /// A radius beyond all machines.
+    #[error("arc radius {radius_mm:e} mm is too large")]
+    RadiusTooLarge { radius_mm: f64 },
     /// A radius of zero.
     #[error("arc radius is zero")]
     ZeroRadius,
@@ -200,6 +206,7 @@ impl ErrorKind {
             K::MalformedNumber { .. } => {
                 "expected digits with at most one sign and one point, such as -0.25".into()
             }
+            K::NumberTooLarge { .. } => "expected at most 1000000000000".into(),
             K::UnclosedComment => "close the comment with ) on the same line".into(),
             K::NestedComment => "use one pair of parentheses per comment".into(),
             K::Parameter | K::Expression => {
@@ -244,6 +251,7 @@ impl ErrorKind {
                 "check the centre words (offsets from the start unless G90.1), or use R".into()
             }
             K::RadiusTooSmall { .. } => "expected R of at least half the distance to the end point".into(),
+            K::RadiusTooLarge { .. } => "use G1 for an arc that is straight".into(),
             K::ZeroRadius => "move the centre away from the start, or use G1".into(),
             K::RadiusFullCircle => "give the centre with I J K for a full circle".into(),
             K::ArcAxisRotary { .. } => "choose another plane (G17, G18, G19)".into(),

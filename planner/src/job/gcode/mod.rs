@@ -24,6 +24,7 @@ mod arc;
 mod axes;
 mod block;
 mod code;
+mod coordinates;
 mod counters;
 mod cycle;
 mod error;

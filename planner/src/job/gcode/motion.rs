@@ -13,7 +13,7 @@ use super::modal::Motion;
 use super::notes::Once;
 use crate::job::machine::Point;
 use crate::job::program::{Arc, Corner, Feed, Item, Move, MoveKind, Shape, StopCause};
-use crate::tolerances::ZERO_LENGTH;
+use crate::tolerances::{FEED_LEAST, ZERO_LENGTH};
 
 /// Most turns of one arc.
 const TURN_LIMIT: u32 = 10_000;
@@ -97,13 +97,13 @@ impl<R: BufRead> Program<R> {
         }
         if self.modal.inverse_time {
             return match self.block.peek(b'F') {
-                Some(per_minute) if per_minute > 0.0 => Ok(Some(Feed::Duration(60.0 / per_minute))),
+                Some(per_minute) if per_minute > FEED_LEAST => Ok(Some(Feed::Duration(60.0 / per_minute))),
                 Some(_) => Err(self.block.fault(b'F', ErrorKind::ZeroFeed)),
                 None => Err(self.motion_fault(ErrorKind::NoInverseTime)),
             };
         }
         let Some(rate) = self.modal.feed else { return Err(self.motion_fault(ErrorKind::NoFeed)) };
-        if rate.mm_per_s == 0.0 {
+        if rate.deg_per_s <= FEED_LEAST {
             return Err(self.motion_fault(ErrorKind::ZeroFeed));
         }
         let delta = std::array::from_fn(|i| target[i] - self.handed[i]);
@@ -161,7 +161,8 @@ impl<R: BufRead> Program<R> {
         let circle = self.circle(origin, programmed)?;
         let turns = self.whole_number(b'P', 1, TURN_LIMIT)?.unwrap_or(1);
         let feed = self.feed(&target, true)?;
-        let ends = [axes.map(|axis| start[axis]), axes.map(|axis| target[axis])];
+        // The programmed start, not the one handed on: only they tell a full circle.
+        let ends = [programmed, axes.map(|axis| target[axis])];
         let arc = arc::arc(axes, ends[0], ends[1], circle, clockwise, turns)
             .map_err(|kind| self.motion_fault(kind))?;
         let (mut low, mut high) = (start, target);

@@ -136,6 +136,13 @@ fn tiny_steps_are_dropped_but_not_lost() {
 }
 
 #[test]
+fn a_full_circle_after_a_dropped_step_is_still_full() {
+    let (_, counters) = run("F100 G1 X10\nX10.0000000001\nG3 X10.0000000001 I5\n");
+    assert_eq!(counters.zero_length, 1);
+    assert!((counters.feed_length_mm - 10.0 - 10.0 * PI).abs() < 1e-6);
+}
+
+#[test]
 fn stops_and_dwells_in_their_order() {
     let text = "T1 M6\nS1000 M3\nG0 X1\nS1200\nG4 P0.5\nG1 X2 F100 M0\nM5\nM2\nG0 X99999\n";
     let (items, counters) = run(text);

@@ -69,6 +69,10 @@ const REFUSED: &[(&str, u32, u32, &str)] = &[
     ("F50 G2 X10", 1, 5, "arc has neither centre (I J) nor"),
     ("F50 G18 G2 X10", 1, 9, "arc has neither centre (I K) nor"),
     ("F50 G2 X10 R0", 1, 5, "arc radius is zero"),
+    ("F50 G2 X1 I99999999", 1, 5, "arc radius 9.9999999e7 mm is too large"),
+    ("F50 G2 X1 R99999999", 1, 5, "arc radius 9.9999999e7 mm is too large"),
+    ("F9999999999999 G1 X1", 1, 1, "the number of F is too large"),
+    ("G93 F0.0000000000001 G1 X1", 1, 5, "feed rate is zero"),
     ("F50 G2 X10 I0 J0", 1, 5, "arc radius is zero"),
     ("F50 G2 X0 Y0 R3", 1, 5, "arc given by R ends where it starts"),
     ("F50 G2 X10 I5 R5", 1, 15, "arc has both"),
@@ -102,6 +106,16 @@ fn every_mistake_has_its_place_and_help() {
 }
 
 #[test]
+fn long_numbers_are_refused_not_overflowed() {
+    let nines = "9".repeat(400);
+    let zeros = "0".repeat(400);
+    for text in [format!("G0 X{nines}"), format!("F1 G2 X1 I{nines}"), format!("G93 F0.{zeros}1 G1 X1")] {
+        refused(&text);
+    }
+    assert_eq!(ends(&format!("G0 X0.{zeros}1Y1")), [[0.0, 1.0, 0.0]]);
+}
+
+#[test]
 fn nothing_of_a_wrong_block_is_handed_on() {
     let text = "G21 G0 X1\nG4 P1 M3 G0 X2 X3\nG0 X4";
     let mut program = Program::new(text.as_bytes(), "part.ngc", &mill(), Options::default());
@@ -128,6 +142,9 @@ fn garbage_without_end_is_refused_at_once() {
     let mut program = Program::new(zeros, "zeros", &mill(), Options::default());
     let error = program.next().unwrap().unwrap_err();
     assert_eq!((error.kind(), error.line()), (&ErrorKind::Binary { byte: 0 }, Some(1)));
+    let mut shown = String::new();
+    miette::NarratableReportHandler::new().render_report(&mut shown, &error).unwrap();
+    assert!(!shown.contains('\0'));
     let digits = std::io::BufReader::new((&b"G1 X"[..]).chain(std::io::repeat(b'7')));
     let error = Program::new(digits, "digits", &mill(), Options::default()).next().unwrap().unwrap_err();
     assert!(matches!(error.kind(), ErrorKind::LineTooLong { .. }));
