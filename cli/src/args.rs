@@ -111,9 +111,9 @@ pub struct RunArgs {
     /// How to plan.
     #[command(flatten)]
     pub plan: PlanArgs,
-    /// Write every N-th set-point to trace.csv
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
-    pub trace_every: u32,
+    /// Write every N-th set-point to trace.csv [default: so that about 200 000 rows are kept]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub trace_every: Option<u32>,
 }
 
 /// `feedspline verify`.

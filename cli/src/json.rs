@@ -163,6 +163,8 @@ pub struct VerifyJson {
     pub certificate: CertificateJson,
     /// The same ratios per axis.
     pub axes: Vec<AxisRatiosJson>,
+    /// What does not hold, the first of it; empty when everything does.
+    pub faults: Vec<String>,
     /// Time to verify [s].
     pub verify_seconds: f64,
 }

@@ -35,6 +35,11 @@ impl Progress {
         Progress { since: None, bar: None, stage: "" }
     }
 
+    /// Whether anybody watches.
+    pub fn watched(&self) -> bool {
+        self.since.is_some()
+    }
+
     /// Names what is being done.
     pub fn stage(&mut self, name: &'static str) {
         self.stage = name;

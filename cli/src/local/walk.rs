@@ -12,7 +12,7 @@ use crate::report::record::{AxisInstant, DriveInstant, Instant};
 
 /// A place in a section that moves forwards in time.
 #[derive(Debug)]
-pub struct Walk<'a> {
+pub(super) struct Walk<'a> {
     section: &'a PlannedSection,
     binding: &'a [Binding],
     linear: u16,
@@ -27,7 +27,7 @@ pub struct Walk<'a> {
 
 impl<'a> Walk<'a> {
     /// At the start of `section`; `linear` is the mask of the machine's linear axes.
-    pub fn new(section: &'a PlannedSection, binding: &'a [Binding], linear: u16) -> Self {
+    pub(super) fn new(section: &'a PlannedSection, binding: &'a [Binding], linear: u16) -> Self {
         let axes = vec![AxisInstant::default(); section.table.path.axes.len()];
         Walk {
             section,
@@ -44,13 +44,13 @@ impl<'a> Walk<'a> {
     }
 
     /// Duration of the section [s].
-    pub fn duration(&self) -> f64 {
+    pub(super) fn duration(&self) -> f64 {
         self.spans.last().map_or(0.0, |s| s.start_s + s.duration_s)
     }
 
     /// The instant `time` after the section's start [s], not before the one asked for last; the job's clock then
     /// shows `clock`. `drives` holds how the simulated drives did, one per axis, or nothing.
-    pub fn instant(&mut self, time: f64, clock: f64, drives: &[DriveInstant]) -> Instant<'_> {
+    pub(super) fn instant(&mut self, time: f64, clock: f64, drives: &[DriveInstant]) -> Instant<'_> {
         while self.at + 1 < self.spans.len() && time >= self.spans[self.at + 1].start_s {
             self.at += 1;
         }

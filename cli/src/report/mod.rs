@@ -8,7 +8,6 @@ mod data;
 mod envelope;
 mod html;
 pub mod model;
-pub mod operations;
 pub mod record;
 mod sections;
 pub mod simplify;

@@ -134,6 +134,13 @@ pub struct Operation {
     pub feed_mm: f64,
 }
 
+impl Operation {
+    /// Everything [s].
+    pub fn seconds(&self) -> f64 {
+        self.feed_s + self.rapid_s + self.dwell_s
+    }
+}
+
 /// Stops of one cause.
 #[derive(Clone, Debug, Serialize)]
 pub struct Stops {
@@ -176,12 +183,14 @@ pub struct TableSize {
     pub shared: u64,
     /// The part of each axis [bytes].
     pub axes: Vec<u64>,
+    /// Headers of all parts [bytes].
+    pub headers: u64,
 }
 
 impl TableSize {
     /// Everything [bytes].
     pub fn total(&self) -> u64 {
-        self.shared + self.axes.iter().sum::<u64>()
+        self.shared + self.axes.iter().sum::<u64>() + self.headers
     }
 }
 

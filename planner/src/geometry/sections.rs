@@ -123,6 +123,19 @@ pub enum GeometryError {
     },
 }
 
+impl GeometryError {
+    /// Line of the program that it is about.
+    pub fn line(&self) -> u32 {
+        match *self {
+            GeometryError::NotFinite { line }
+            | GeometryError::Gap { line }
+            | GeometryError::TooFar { line }
+            | GeometryError::TooManySpans { line }
+            | GeometryError::NotCertified { line, .. } => line,
+        }
+    }
+}
+
 /// Why the stream of sections ends early.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SectionError<E> {

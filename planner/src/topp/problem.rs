@@ -29,6 +29,13 @@ pub struct Settings {
     pub spans_per_ramp: f64,
 }
 
+impl Default for Settings {
+    /// The interior-point method, within a hundredth of a permille of the optimum, at a tenth of a percent lost to knots.
+    fn default() -> Self {
+        Settings { solver: Solver::InteriorPoint, relative_gap: 1e-5, spans_per_ramp: 4.0 }
+    }
+}
+
 /// The solvers behind the one problem type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solver {

@@ -1,0 +1,211 @@
+//! From the command line to a planned job.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::time::Instant;
+
+use miette::Diagnostic;
+use planner::analysis::comparison::Comparison;
+use planner::geometry::sections::{PathSettings, SectionError, sections};
+use planner::job::gcode::{self, Counters, Options, ProgramError};
+use planner::job::machine::Machine;
+use planner::job::program::{Corner, Item, MoveKind, StopCause, ToleranceSource};
+use planner::pipeline::{self, JobError, JobPlan, LimitSet};
+use planner::topp::problem::{Settings, Solver};
+
+use crate::args::{self, PlanArgs};
+use crate::failure::{Failure, Place};
+use crate::progress::Progress;
+
+/// The machine that jobs run on when none is named.
+const BUILT_IN: &str = include_str!("../../../jobs/mill3.toml");
+
+/// Bytes of a program that are read ahead to tell how long it is.
+const READ_AHEAD: usize = 1 << 16;
+
+/// A planned job with everything that is known of it.
+#[derive(Debug)]
+pub(super) struct Fitted {
+    pub(super) machine: Machine,
+    pub(super) plan: JobPlan,
+    pub(super) counters: Counters,
+    pub(super) comparison: Comparison,
+    pub(super) stops: BTreeMap<StopCause, u64>,
+    pub(super) tolerance: InForce,
+    pub(super) seconds: f64,
+}
+
+/// The largest path tolerance in force, and who set it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct InForce {
+    pub(super) mm: f64,
+    pub(super) source: Option<ToleranceSource>,
+}
+
+/// Reads, fits, plans and certifies a job.
+///
+/// # Errors
+/// Bad input, with its place.
+pub(super) fn plan(args: &PlanArgs, progress: &mut Progress) -> Result<Fitted, Failure> {
+    let begin = Instant::now();
+    if let Some(threads) = args.threads {
+        // Fails only when threads run already, which happens when one process plans twice.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
+    }
+    let machine = match &args.machine {
+        Some(path) => Machine::load(path),
+        None => Machine::from_toml(BUILT_IN, "built-in machine"),
+    }
+    .map_err(|e| diagnosed(&e, e.line(), e.column(), args.machine.as_deref()))?;
+    let refused = |e: ProgramError| diagnosed(&e, e.line(), e.column(), Some(&args.job));
+    let mut program = gcode::open(&args.job, &machine, options(args)).map_err(refused)?;
+
+    progress.stage("planning");
+    let lines = if progress.watched() { line_count(&args.job) } else { 0 };
+    let mut comparison = Comparison::new(&machine.axes);
+    let mut tolerance = InForce::default();
+    let items = program.by_ref().inspect(|item| match item {
+        Ok(Item::Move(m)) => {
+            comparison.add(m);
+            if m.kind == MoveKind::Feed {
+                tolerance.note(m.corner, &machine);
+            }
+        }
+        Ok(Item::Dwell { seconds, .. }) => comparison.add_dwell(*seconds),
+        Ok(Item::Stop { .. } | Item::Note { .. }) | Err(_) => {}
+    });
+    let mut sections = sections(items, &machine, &PathSettings::of(&machine));
+    let planned = pipeline::plan(&mut sections, &machine, limits(args), &settings(args), &mut |line| {
+        progress.share(f64::from(line) / lines.max(1) as f64);
+    });
+    let stops = sections.stops().clone();
+    drop(sections);
+    let plan = planned.map_err(|e| match e {
+        JobError::Section(SectionError::Program(e)) => refused(e),
+        JobError::Section(SectionError::Geometry(e)) => at_line(&args.job, e.line(), &e.to_string())
+            .with_help("Widen the tolerance (G64 P or --tolerance), or change the path at this line."),
+        JobError::Plan { line, fault } => at_line(&args.job, line, &fault.to_string()),
+    })?;
+    let counters = program.counters().clone();
+    Ok(Fitted {
+        machine,
+        plan,
+        counters,
+        comparison,
+        stops,
+        tolerance,
+        seconds: begin.elapsed().as_secs_f64(),
+    })
+}
+
+impl InForce {
+    /// Takes in the corner of one feed move.
+    fn note(&mut self, corner: Corner, machine: &Machine) {
+        let (mm, source) = match corner {
+            Corner::Within { tolerance_mm, source } if tolerance_mm > 0.0 => (tolerance_mm, source),
+            Corner::Within { source, .. } => (machine.exact_path_mm, source),
+            Corner::Stop | Corner::Exact => (machine.exact_path_mm, ToleranceSource::Program),
+        };
+        if self.source.is_none() || mm > self.mm {
+            *self = InForce { mm, source: Some(source) };
+        }
+    }
+
+    /// In words.
+    pub(super) fn words(self) -> &'static str {
+        match self.source {
+            Some(ToleranceSource::Program) => "program",
+            Some(ToleranceSource::CommandLine) => "command line",
+            Some(ToleranceSource::BestSpeed) => "machine, for G64 without P",
+            Some(ToleranceSource::Machine) | None => "machine",
+        }
+    }
+}
+
+fn options(args: &PlanArgs) -> Options {
+    Options {
+        dialect: match args.dialect {
+            args::Dialect::Rs274 => gcode::Dialect::Rs274,
+            args::Dialect::Printer => gcode::Dialect::Printer,
+        },
+        tolerance_mm: args.tolerance,
+        ignore_feed: args.ignore_feed,
+        block_delete: false,
+    }
+}
+
+fn limits(args: &PlanArgs) -> LimitSet {
+    match args.limits {
+        args::Limits::Va => LimitSet::VelocityAcceleration,
+        args::Limits::Vaj => LimitSet::VelocityAccelerationJerk,
+    }
+}
+
+fn settings(args: &PlanArgs) -> Settings {
+    let solver = match args.solver {
+        args::Solver::InteriorPoint => Solver::InteriorPoint,
+        args::Solver::Clarabel => Solver::Clarabel,
+    };
+    Settings { solver, ..Settings::default() }
+}
+
+/// A failure from a diagnostic that already knows its place.
+pub(super) fn diagnosed(
+    error: &dyn Diagnostic,
+    line: Option<u32>,
+    column: Option<u32>,
+    file: Option<&Path>,
+) -> Failure {
+    // Displayed errors start with their place, which the failure shows by itself.
+    let name = file.map_or("built-in machine".into(), |f| f.display().to_string());
+    let text = error.to_string();
+    let message = match (line, column) {
+        (Some(l), Some(c)) => text.strip_prefix(&format!("{name}:{l}:{c}: ")).unwrap_or(&text).to_owned(),
+        _ => text.strip_prefix(&format!("{name}: ")).unwrap_or(&text).to_owned(),
+    };
+    let mut failure = Failure::input(message);
+    if let Some(help) = error.help() {
+        failure = failure.with_help(help.to_string());
+    }
+    let Some(file) = file else { return failure };
+    match (line, column) {
+        (Some(line), Some(column)) => {
+            let width = error.labels().and_then(|mut l| l.next()).map_or(1, |l| l.len());
+            failure.at(file, Place::new(line, column, width, &line_text(file, line)))
+        }
+        _ => failure.in_file(file),
+    }
+}
+
+/// Bad input at a line of the program, as a whole.
+fn at_line(file: &Path, line: u32, message: &str) -> Failure {
+    let text = line_text(file, line);
+    let message = message.strip_prefix(&format!("line {line}: ")).unwrap_or(message);
+    Failure::input(message).at(file, Place::new(line, 1, text.len(), &text))
+}
+
+/// The bytes of one line; empty when it cannot be read again.
+fn line_text(file: &Path, line: u32) -> Vec<u8> {
+    let Ok(file) = File::open(file) else { return Vec::new() };
+    let mut lines = BufReader::new(file).split(b'\n');
+    let text = lines.nth(line.max(1) as usize - 1).and_then(Result::ok).unwrap_or_default();
+    text.strip_suffix(b"\r").unwrap_or(&text).to_vec()
+}
+
+/// Lines of a file; zero when it cannot be read.
+fn line_count(file: &Path) -> usize {
+    let Ok(file) = File::open(file) else { return 0 };
+    let mut reader = BufReader::with_capacity(READ_AHEAD, file);
+    let mut lines = 0;
+    while let Ok(bytes) = reader.fill_buf() {
+        if bytes.is_empty() {
+            break;
+        }
+        lines += bytes.iter().filter(|&&b| b == b'\n').count();
+        let used = bytes.len();
+        reader.consume(used);
+    }
+    lines
+}

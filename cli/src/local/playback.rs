@@ -1,0 +1,168 @@
+//! The motion of a planned job, instant by instant: as planned, or as simulated drives play it.
+
+use std::io::{self, Write};
+
+use host_sim::report::SimReport;
+use host_sim::scenario::{SimSettings, simulate};
+use host_sim::trace::{CsvTrace, Rows, TraceHeader, TraceRow, TraceSink};
+use planner::feed::job::{JobItem, PlannedSection};
+use planner::job::machine::AxisKind;
+use planner::topp::problem::Binding;
+
+use super::fitting::Fitted;
+use super::outcome::report_axes;
+use super::walk::Walk;
+use crate::failure::Failure;
+use crate::progress::Progress;
+use crate::report::model::{Limit, Mode, Motion};
+use crate::report::record::{AxisInstant, DriveInstant, Instant, Recorder};
+
+/// Instants of a plan that is only looked at.
+const INSTANTS: f64 = 200_000.0;
+
+/// What the simulation gives.
+#[derive(Debug)]
+pub(super) struct Played {
+    pub(super) motion: Motion,
+    pub(super) drives: Drives,
+}
+
+/// How the simulated drives did.
+#[derive(Debug)]
+pub(super) struct Drives {
+    pub(super) report: SimReport,
+    /// Computing time of the simulation [s].
+    pub(super) seconds: f64,
+}
+
+/// The motion as planned.
+pub(super) fn planned(fitted: &Fitted) -> Motion {
+    let cycle: f64 = fitted.plan.items.iter().map(seconds).sum();
+    let interval = fitted.machine.control_tick_s.max(cycle / INSTANTS);
+    let mut recorder = Recorder::new(&report_axes(&fitted.machine));
+    let mut binding = fitted.plan.binding.iter();
+    let mut clock = 0.0;
+    for item in &fitted.plan.items {
+        if let JobItem::Section(section) = item {
+            let binding = binding.next().map_or(&[][..], Vec::as_slice);
+            let mut walk = Walk::new(section, binding, linear(fitted));
+            let duration = walk.duration();
+            let count = (duration / interval).ceil().max(1.0) as u64;
+            for k in 0..=count {
+                let time = (k as f64 * interval).min(duration);
+                recorder.push(&walk.instant(time, clock + time, &[]));
+            }
+        }
+        clock += seconds(item);
+    }
+    recorder.finish()
+}
+
+/// The motion as simulated drives play it; the trace goes to `out` as CSV.
+///
+/// # Errors
+/// A drive refuses a table, or the trace cannot be written.
+pub(super) fn simulated(
+    fitted: &Fitted,
+    every: Option<u32>,
+    out: &mut dyn Write,
+    progress: &mut Progress,
+) -> Result<Played, Failure> {
+    let begin = std::time::Instant::now();
+    progress.stage("simulating");
+    let rows = every.map_or(Rows::default(), |n| Rows::Every(n.into()));
+    let mut sink = (CsvTrace::new(out, rows), Watch::new(fitted));
+    let report =
+        simulate(&fitted.plan.items, &fitted.machine, &SimSettings::default(), &mut sink, &mut |p| {
+            progress.share(if p.total_s > 0.0 { p.done_s / p.total_s } else { 1.0 })
+        })
+        .map_err(|e| Failure::internal(format!("the simulated drives cannot play the tables: {e}")))?;
+    let motion = sink.1.recorder.finish();
+    Ok(Played { motion, drives: Drives { report, seconds: begin.elapsed().as_secs_f64() } })
+}
+
+/// Time that an item takes [s].
+pub(super) fn seconds(item: &JobItem) -> f64 {
+    match item {
+        JobItem::Section(section) => section.table.duration(),
+        JobItem::Dwell { seconds, .. } => *seconds,
+        JobItem::Note { .. } => 0.0,
+    }
+}
+
+/// Mask of the linear axes.
+fn linear(fitted: &Fitted) -> u16 {
+    let axes = fitted.machine.axes.iter().enumerate();
+    axes.filter(|(_, a)| a.kind == AxisKind::Linear).fold(0, |mask, (i, _)| mask | 1 << i)
+}
+
+/// Records what the plan asks for and what the drives do, tick by tick.
+struct Watch<'a> {
+    sections: Vec<(&'a PlannedSection, &'a [Binding])>,
+    linear: u16,
+    walk: Option<(usize, Walk<'a>)>,
+    recorder: Recorder,
+    drives: Vec<DriveInstant>,
+    still: Vec<AxisInstant>,
+    line: u32,
+}
+
+impl<'a> Watch<'a> {
+    fn new(fitted: &'a Fitted) -> Self {
+        let binding = fitted.plan.binding.iter().map(Vec::as_slice);
+        Watch {
+            sections: fitted.plan.sections().zip(binding).collect(),
+            linear: linear(fitted),
+            walk: None,
+            recorder: Recorder::new(&report_axes(&fitted.machine)),
+            drives: Vec::new(),
+            still: Vec::new(),
+            line: 0,
+        }
+    }
+}
+
+impl TraceSink for Watch<'_> {
+    fn begin(&mut self, _: &TraceHeader) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn row(&mut self, row: &TraceRow<'_>) -> io::Result<()> {
+        self.drives.clear();
+        let drives = row.axes.iter().map(|a| DriveInstant { error: a.following_error, effort: a.effort });
+        self.drives.extend(drives);
+        let Some(place) = row.place else {
+            self.still.clear();
+            let axes = row.axes.iter().zip(&self.drives);
+            self.still.extend(axes.map(|(a, &drive)| AxisInstant {
+                position: a.position,
+                drive: Some(drive),
+                ..AxisInstant::default()
+            }));
+            self.recorder.push(&Instant {
+                time: row.time_s,
+                line: self.line,
+                mode: Mode::Still,
+                limit: Limit::Dwell,
+                speed: 0.0,
+                feed: None,
+                axes: &self.still,
+            });
+            return Ok(());
+        };
+        if self.walk.as_ref().is_none_or(|(table, _)| *table != place.table) {
+            self.walk =
+                self.sections.get(place.table).map(|&(s, b)| (place.table, Walk::new(s, b, self.linear)));
+        }
+        if let Some((_, walk)) = &mut self.walk {
+            let instant = walk.instant(place.time_s, row.time_s, &self.drives);
+            self.line = instant.line;
+            self.recorder.push(&instant);
+        }
+        Ok(())
+    }
+
+    fn end(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
