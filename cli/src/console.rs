@@ -1,6 +1,6 @@
 //! Where text goes: results to standard output, everything else to standard error.
 
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use serde::Serialize;
@@ -48,7 +48,7 @@ impl<'a> Console<'a> {
         {
             let _ = writeln!(self.out, "{line}");
         }
-        let theme = if std::io::IsTerminal::is_terminal(&std::io::stderr()) {
+        let theme = if std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none() {
             GraphicalTheme::unicode()
         } else {
             GraphicalTheme::unicode_nocolor()

@@ -2,15 +2,11 @@
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use miette::{
-    Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents,
-};
+use miette::{Diagnostic, LabeledSpan, SourceCode};
 
 use crate::{EXIT_BAD_INPUT, EXIT_FAILED};
-
-/// Longest piece of an input line that a diagnostic quotes [bytes].
-const QUOTE: usize = 160;
 
 /// Whose fault it is; chooses the exit status.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,46 +29,31 @@ pub struct Failure {
     /// The file it was found in.
     pub file: Option<PathBuf>,
     /// The place in that file.
-    pub place: Option<Box<Place>>,
+    pub place: Option<Place>,
+    /// The error behind it, which can quote the file.
+    quote: Option<Arc<dyn Diagnostic + Send + Sync>>,
 }
 
 /// A place in an input file.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Line, from 1.
     pub line: u32,
     /// Column in bytes, from 1.
     pub column: u32,
-    excerpt: Excerpt,
-}
-
-impl Place {
-    /// The place `line:column`, `width` bytes wide, and the text of that line.
-    ///
-    /// Long lines are cut around the column, and bytes that are no text are replaced, so that any input at
-    /// all can be quoted.
-    pub fn new(line: u32, column: u32, width: usize, text: &[u8]) -> Self {
-        let at = (column.max(1) as usize - 1).min(text.len());
-        let from = at.saturating_sub(QUOTE / 2);
-        let until = (from + QUOTE).min(text.len());
-        let show = |bytes: &[u8]| -> String {
-            String::from_utf8_lossy(bytes)
-                .chars()
-                .map(|c| if c.is_control() { '\u{fffd}' } else { c })
-                .collect()
-        };
-        let (before, after) = (show(&text[from..at]), show(&text[at..until]));
-        let marked = show(&text[at..(at + width).min(until)]).len();
-        let text = format!("{before}{after}\n");
-        let excerpt = Excerpt { name: String::new(), line, text, offset: before.len(), width: marked.max(1) };
-        Place { line, column, excerpt }
-    }
 }
 
 impl Failure {
     /// Bad input that has no place in a file.
     pub fn input(message: impl Into<String>) -> Self {
-        Failure { blame: Blame::Input, message: message.into(), help: None, file: None, place: None }
+        Failure {
+            blame: Blame::Input,
+            message: message.into(),
+            help: None,
+            file: None,
+            place: None,
+            quote: None,
+        }
     }
 
     /// A failure that is not the input's fault.
@@ -102,17 +83,21 @@ impl Failure {
 
     /// Adds the file.
     pub fn in_file(mut self, path: &Path) -> Self {
-        if let Some(place) = &mut self.place {
-            place.excerpt.name = path.display().to_string();
-        }
         self.file = Some(path.to_path_buf());
         self
     }
 
     /// Adds the file and the place in it.
-    pub fn at(mut self, path: &Path, place: Place) -> Self {
-        self.place = Some(Box::new(place));
+    pub fn at(mut self, path: &Path, line: u32, column: u32) -> Self {
+        self.place = Some(Place { line, column });
         self.in_file(path)
+    }
+
+    /// Takes over the quoted source, the labels, and the help if there is none yet, of the error behind it.
+    pub fn quoting(mut self, error: impl Diagnostic + Send + Sync + 'static) -> Self {
+        self.help = self.help.or_else(|| error.help().map(|help| help.to_string()));
+        self.quote = Some(Arc::new(error));
+        self
     }
 
     /// The exit status that tells of it.
@@ -145,51 +130,18 @@ impl Diagnostic for Failure {
     }
 
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.place.as_ref().map(|place| &place.excerpt as &dyn SourceCode)
+        self.quote.as_ref()?.source_code()
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let excerpt = &self.place.as_ref()?.excerpt;
-        let span = LabeledSpan::new(Some("here".into()), excerpt.offset, excerpt.width);
-        Some(Box::new(std::iter::once(span)))
-    }
-}
-
-/// One line of a file that is not kept in memory.
-#[derive(Clone, Debug)]
-struct Excerpt {
-    name: String,
-    line: u32,
-    text: String,
-    offset: usize,
-    width: usize,
-}
-
-impl SourceCode for Excerpt {
-    fn read_span<'a>(
-        &'a self,
-        span: &SourceSpan,
-        before: usize,
-        after: usize,
-    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
-        let inner = self.text.read_span(span, before, after)?;
-        let line = self.line.max(1) as usize - 1 + inner.line();
-        let contents = MietteSpanContents::new_named(
-            self.name.clone(),
-            inner.data(),
-            *inner.span(),
-            line,
-            inner.column(),
-            inner.line_count(),
-        );
-        Ok(Box::new(contents))
+        self.quote.as_ref()?.labels()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use miette::{GraphicalReportHandler, GraphicalTheme};
+    use miette::{GraphicalReportHandler, GraphicalTheme, NamedSource};
 
     fn render(failure: &Failure) -> String {
         let mut text = String::new();
@@ -197,27 +149,35 @@ mod tests {
         text
     }
 
-    #[test]
-    fn diagnostic_names_file_line_column_and_help() {
-        let failure = Failure::input("feed is zero")
-            .at(Path::new("part.ngc"), Place::new(207, 9, 2, b"G1 X10. F0"))
-            .with_help("Program a feed above zero.");
-        let text = render(&failure);
-        assert!(text.contains("part.ngc:207:9: feed is zero"), "{text}");
-        assert!(text.contains("part.ngc:207:9]"), "{text}");
-        assert!(text.contains("G1 X10. F0"), "{text}");
-        assert!(text.contains("Program a feed above zero."), "{text}");
+    /// An error of the planner's kind.
+    #[derive(Debug, thiserror::Error, Diagnostic)]
+    #[error("part.ngc:1:9: feed is zero")]
+    #[diagnostic(help("Program a feed above zero."))]
+    struct ZeroFeed {
+        #[source_code]
+        text: NamedSource<String>,
+        #[label("here")]
+        at: (usize, usize),
     }
 
     #[test]
-    fn any_bytes_and_any_column_can_be_quoted() {
-        let long = vec![0u8; 5000];
-        for (column, text) in [(1, &b""[..]), (0, b"X"), (4000, &long), (u32::MAX, b"\xff\xfe\x1b[31m")] {
-            let failure =
-                Failure::input("no").at(Path::new("x"), Place::new(3, column, usize::MAX / 4, text));
-            let shown = render(&failure);
-            assert!(!shown.contains('\u{1b}') && shown.len() < 3000, "{shown}");
+    fn diagnostic_names_file_line_column_and_help_and_quotes_the_source() {
+        let text = NamedSource::new("part.ngc", "G1 X10. F0\n".to_string());
+        let failure = Failure::input("feed is zero")
+            .at(Path::new("part.ngc"), 1, 9)
+            .quoting(ZeroFeed { text, at: (8, 2) });
+        let text = render(&failure);
+        for part in ["part.ngc:1:9: feed is zero", "G1 X10. F0", "here", "Program a feed above zero."] {
+            assert!(text.contains(part), "{part} in {text}");
         }
+        assert_eq!(text.matches("feed is zero").count(), 1, "{text}");
+    }
+
+    #[test]
+    fn own_help_goes_first() {
+        let text = NamedSource::new("part.ngc", "G1\n".to_string());
+        let failure = Failure::input("no").with_help("do this").quoting(ZeroFeed { text, at: (0, 1) });
+        assert_eq!(failure.help.as_deref(), Some("do this"));
     }
 
     #[test]

@@ -15,7 +15,7 @@ pub struct PlanJson {
     pub machine: String,
     /// Axes in the machine's order.
     pub axes: Vec<AxisJson>,
-    /// Motion commands that move something.
+    /// Blocks with at least one word.
     pub blocks: u64,
     /// Rapid commands.
     pub rapids: u64,
@@ -106,7 +106,7 @@ pub struct CertificateJson {
 /// What the simulated drives did.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SimulationJson {
-    /// Set-points per axis.
+    /// Set-points that the drives played, all axes together.
     pub setpoints: u64,
     /// Hash of every set-point of every axis in order, 16 hexadecimal digits.
     pub setpoint_hash: String,

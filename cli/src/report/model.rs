@@ -67,7 +67,7 @@ pub struct Tolerance {
 /// What the program holds.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Counts {
-    /// Motion commands that move something.
+    /// Blocks with at least one word.
     pub blocks: u64,
     /// Rapid commands.
     pub rapids: u64,
@@ -199,7 +199,7 @@ impl TableSize {
 pub struct Simulation {
     /// Control tick [s].
     pub tick_s: f64,
-    /// Set-points per axis.
+    /// Set-points that the drives played, all axes together.
     pub setpoints: u64,
     /// Hash of every set-point.
     pub setpoint_hash: String,

@@ -299,13 +299,13 @@
         Object.assign(g, { strokeStyle: colour, lineWidth: width }).setLineDash(dash || []);
         g.stroke();
       };
-      const marks = document.getElementById("slow").checked, byLimit = colouring() === "limit";
+      const marks = document.getElementById("slow").checked, byLimit = colouring() === "limit", pen = n > 6000 ? 1.2 : 2.2;
       stroke(i => P.mode[i] === 2, css("--rapid"), 1, [4, 5]);
-      if (marks) stroke(i => P.mode[i] !== 2 && P.slow[i], css("--halo"), 5.5);
+      if (marks) stroke(i => P.mode[i] !== 2 && P.slow[i], css("--halo"), pen * 2.5);
       const bins = byLimit ? D.legend.length : 40;
       const bin = Int16Array.from(P.speed, (s, i) => P.mode[i] === 2 ? -1 : byLimit ? P.limit[i] : Math.min(Math.floor(s / topSpeed * bins), bins - 1));
       for (let k = bins - 1; k >= 0; k--) {
-        stroke(i => bin[i] === k, byLimit ? D.legend[k].colour : heat((k + 0.5) / bins), 2.2);
+        stroke(i => bin[i] === k, byLimit ? D.legend[k].colour : heat((k + 0.5) / bins), pen);
       }
       if (marks) this.pins(g);
       g.restore();

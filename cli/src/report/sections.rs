@@ -87,7 +87,7 @@ pub(super) fn headline(report: &Report) -> Markup {
                 (card(
                     "End state, simulated",
                     if all { "\u{2713} exact, at rest" } else { "\u{2717} off the end point" },
-                    &format!("{arrived} of {} drives, {} set-points each", sim.axes.len(), count(sim.setpoints)),
+                    &format!("{arrived} of {} drives, {} set-points", sim.axes.len(), count(sim.setpoints)),
                     if all { "good" } else { "bad" },
                 ))
                 (card("Following error, simulated", &largest_error(report, &sim.axes), &rms_error(report, &sim.axes), ""))

@@ -151,7 +151,7 @@ pub(super) fn proof(report: &Report) -> Markup {
                     } }
                 } }
                 p.note {
-                    (count(sim.setpoints)) " set-points per axis at " (number(sim.tick_s * 1e3)) " ms, hash "
+                    (count(sim.setpoints)) " set-points of all axes at " (number(sim.tick_s * 1e3)) " ms, hash "
                     code { (sim.setpoint_hash) } ", never more than " (number(sim.path_deviation_counts))
                     " counts from the exact plan."
                 }
@@ -182,7 +182,7 @@ pub(super) fn facts(report: &Report) -> Markup {
             div {
                 h2 { "Program" }
                 table.facts { tbody {
-                    (fact("Blocks that move", &count(c.blocks)))
+                    (fact("Blocks", &count(c.blocks)))
                     (fact("Lines", &count(c.lines)))
                     (fact("Arcs", &count(c.arcs)))
                     @if c.splines > 0 { (fact("Splines", &count(c.splines))) }

@@ -333,7 +333,7 @@ fn finish(axes: Vec<Axis>, recorder: Recorder, cycle_s: f64, motion_s: f64) -> R
         motion: recorder.finish(),
         simulation: Some(Simulation {
             tick_s: TICK_S,
-            setpoints: (cycle_s / TICK_S) as u64,
+            setpoints: n as u64 * (cycle_s / TICK_S) as u64,
             setpoint_hash: "9f2c4411d07be83a".into(),
             path_deviation_counts: 0.62,
             axes: (0..n).map(end).collect(),

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use cli::args::{PlanArgs, RunArgs};
 use cli::engine::{Engine, Outcome};
-use cli::failure::{Failure, Place};
+use cli::failure::Failure;
 use cli::json::{AxisRatiosJson, CertificateJson, InspectAxisJson, InspectJson, VerifyJson};
 use cli::progress::Progress;
 use serde_json::Value;
@@ -23,7 +23,7 @@ impl Scripted {
     fn outcome(&self, simulated: bool) -> Result<Outcome, Failure> {
         if self.fails {
             return Err(Failure::input("feed is zero")
-                .at(Path::new("part.ngc"), Place::new(7, 5, 2, b"G1 X1 F0"))
+                .at(Path::new("part.ngc"), 7, 5)
                 .with_help("Program a feed above zero."));
         }
         let mut outcome = sample::outcome(simulated);
