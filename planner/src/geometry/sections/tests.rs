@@ -132,7 +132,7 @@ impl Program {
 
     /// The programmed contour as a fine polyline.
     fn contour(&self) -> Vec<Point> {
-        self.moves().flat_map(|m| sampled(m, 1e-6)).collect()
+        self.moves().flat_map(|m| sampled(m, 1e-5)).collect()
     }
 }
 
@@ -272,7 +272,7 @@ fn examine(program: &Program, machine: &Machine) -> Vec<Section> {
         }
     }
     // Sampled chords and far coordinates are not exact either.
-    let slop = 4e-6 + 1e-13 * size + 1e-3 * bound;
+    let slop = 1.2e-5 + 1e-13 * size + 1e-3 * bound;
     if !whole.is_empty() {
         let there = one_way(&whole, &contour, 1);
         assert!(there <= bound + slop, "path to contour {there}, proven {bound}");
@@ -522,6 +522,31 @@ fn bad_numbers_and_gaps_are_refused() {
     assert!(matches!(first_error(&p), SectionError::Geometry(_)));
 }
 
+#[test]
+fn short_reversals_within_the_tolerance_do_not_stall() {
+    let mut p = Program::new(&[0.0], Corner::Within(0.05));
+    p.line(&[0.024]).line(&[0.0072]).line(&[0.0118]).line(&[0.0107]);
+    examine(&p, &mill());
+}
+
+#[test]
+fn hostile_numbers_end_in_bounded_time() {
+    let machine = mill();
+    let sizes = [1e-300, 1e-12, 1e-4, 1.0, 1e5, 1e11, 1e300];
+    for tolerance in [1e-300, 1e-9, 1e-3, 1e9] {
+        for size in sizes {
+            for sweep in [1e-12, 3.0, -1e4, 1e12] {
+                let mut p = Program::new(&[0.0], Corner::Within(tolerance));
+                p.line(&[size, 0.0, 0.0]).arc([0, 1], size, 0.0, sweep, size).line(&[0.0, -size, size]);
+                for item in sections(p.stream(), &machine, &PathSettings::of(&machine)) {
+                    let Ok(SectionItem::Section(s)) = item else { continue };
+                    assert!(s.marks.deviation.bound_mm <= s.marks.deviation.tolerance_mm);
+                }
+            }
+        }
+    }
+}
+
 /// A move relative to the last end.
 #[derive(Clone, Debug)]
 enum Step {
@@ -545,7 +570,7 @@ fn step() -> impl Strategy<Value = Step> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 40, ..ProptestConfig::default() })]
 
     #[test]
     fn any_contour_is_fitted_within_its_tolerance(
