@@ -1,2 +1,7 @@
 //! The `feedspline` command.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    cli::main(std::env::args_os(), &cli::local::Local)
+}

@@ -1,4 +1,17 @@
 //! What runs on every motor drive: table store, evaluator, drive state.
 //!
-//! No allocation, no panic, no `f64`, no `unsafe`; bounded work per tick.
+//! No allocation, no panic, no `f64`, no `unsafe`; bounded work per tick. Arithmetic is IEEE + - * / and square
+//! root only, so the same source gives the same bits on every machine.
+//!
+//! [`table`] is the one door: bytes become a [`table::CheckedTable`] or a named error. [`evaluate`] plays a
+//! checked table at any path time. [`player`] is the axis' state machine on the level of messages;
+//! [`drive`] puts it behind CAN frames.
 #![no_std]
+
+pub mod drive;
+pub mod evaluate;
+mod math;
+pub mod player;
+mod store;
+pub mod table;
+pub mod time;

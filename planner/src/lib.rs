@@ -5,6 +5,7 @@
 //! and packs that motion as a feed table; [`certificate`] proves the rounded table against every limit.
 //! [`pipeline`] runs them in order.
 
+pub mod analysis;
 pub mod certificate;
 pub mod feed;
 pub mod geometry;

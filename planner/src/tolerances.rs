@@ -31,7 +31,56 @@ pub const LSB_OVER_SPAN: f64 = 2.5e-4;
 
 /// A move may start this far from the end of the one before it, relative to the largest coordinate (at least 1).
 pub const CONTOUR_GAP: f64 = 1e-6;
+/// The certificate halves a span until its bound is no further above a ratio that is surely attained.
+pub const CERTIFICATE_TIGHTNESS: f64 = 1e-3;
+
+/// A limit rules where its ratio is within this of one.
+pub const BINDING: f64 = 0.01;
+
+/// The programmed feed counts as reached from this share of it on.
+pub const FEED_REACHED: f64 = 0.99;
+
+/// A stated limit may exceed the machine's by this share: it covers the conversion of units.
+pub const STATED_LIMIT: f64 = 1e-9;
+/// A row of the feed problem, evaluated at the rounded control values in f64, may exceed its bound by this much.
+pub const ROW_ARITHMETIC: f64 = 1e-9;
+
+/// Largest |gamma| w^2 of a span: 1/4, up to which the drives' series are exact to f32, with room for the
+/// rounding of their own check.
+pub const TABLE_SERIES_ARGUMENT: f64 = 0.25 * (1.0 + 1e-5);
+/// Two points of a program are one when they differ by less than this, relative to their coordinates: the same
+/// digits give the same point up to the rounding of offsets. An arc between such points is a full circle.
+pub const SAME_POINT: f64 = 1e-12;
+
+/// Start and end radius of an arc may differ by this much [mm] whatever its size: 0.0005 in, the rounding of
+/// coarse CAM output (LinuxCNC G-code reference, "center format arcs").
+pub const ARC_RADII_MM: f64 = 0.0127;
+
+/// Above [`ARC_RADII_MM`], start and end radius of an arc may differ by this share of the radius (same source) ...
+pub const ARC_RADII_RATIO: f64 = 1e-3;
+
+/// ... but never by more than this [mm] (same source).
+pub const ARC_RADII_MOST_MM: f64 = 0.5;
+
+/// An arc's R may fall short of half the chord by this much [mm]: 0.00005 in (LinuxCNC, RADIUS_TOLERANCE).
+pub const ARC_REACH_MM: f64 = 0.00127;
+
+/// Least radius of an arc [mm]: a nanometre is below the resolution of every machine.
+pub const ARC_RADIUS_LEAST_MM: f64 = 1e-6;
+/// The unit of an axis' control points may differ from a power of two of a count by this share: it covers the
+/// rounding of the unit and of the counts per axis unit.
+pub const LSB_RATIO: f64 = 1e-12;
+
+/// A span's duration keeps this share away from the shortest and longest that drives accept: they compute it in
+/// f32.
+pub const FORMAT_MARGIN: f64 = 1e-6;
 
 /// A move also has to be below this share of a drive count to count as zero: far from the origin
 /// [`ZERO_LENGTH`] alone would swallow counts.
 pub const ZERO_COUNT: f64 = 1e-3;
+
+/// Largest radius of an arc [mm]: above ten kilometres, centre and radius no longer give positions to a nanometre.
+pub const ARC_RADIUS_MOST_MM: f64 = 1e7;
+
+/// Feeds up to this are zero [1/min or program units/s]: times and speeds stay finite and positive.
+pub const FEED_LEAST: f64 = 1e-9;

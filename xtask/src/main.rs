@@ -1,2 +1,101 @@
-//! One front door for building, checking and measuring.
-fn main() {}
+//! One front door for building, checking and measuring: `cargo xtask <word>`.
+
+mod names;
+mod real;
+mod shell;
+mod tests;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use shell::{Step, cargo, run_all};
+
+/// Builds, checks and measures the workspace.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Cli {
+    #[command(subcommand)]
+    word: Word,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+enum Word {
+    /// Format every crate
+    Fmt,
+    /// Clippy on every target, warnings are errors
+    Lint,
+    /// Everything that has to pass: format, lints, names in the documentation, all tests
+    Test,
+    /// Run the benches
+    Bench,
+    /// Build the documentation, warnings are errors
+    Doc,
+    /// What a change has to pass before it goes in: test, doc and a release build
+    Ci,
+    /// Check that what docs/architecture.md and the README name exists
+    Names,
+    /// Run the release binary over a folder of part programs and print a table
+    Real {
+        /// The folder; sub-folders are searched, .gz files are unpacked with gzip
+        dir: PathBuf,
+        /// Machine file for all of them
+        #[arg(long)]
+        machine: Option<PathBuf>,
+    },
+}
+
+fn main() -> ExitCode {
+    let root = root();
+    let result = match Cli::parse().word {
+        Word::Fmt => cargo(&root, &["fmt", "--all"]),
+        Word::Lint => lint(&root),
+        Word::Test => test(&root),
+        Word::Bench => cargo(&root, &["bench", "--workspace"]),
+        Word::Doc => doc(&root),
+        Word::Ci => run_all(&[
+            ("test", &|| test(&root)),
+            ("doc", &|| doc(&root)),
+            ("release build", &|| cargo(&root, &["build", "--release"])),
+        ]),
+        Word::Names => names::check(&root),
+        Word::Real { dir, machine } => real::table(&root, &dir, machine.as_deref()),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("xtask: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The workspace: the folder above this crate.
+fn root() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here).to_path_buf()
+}
+
+fn lint(root: &Path) -> Step {
+    cargo(root, &["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"])
+}
+
+fn doc(root: &Path) -> Step {
+    shell::cargo_with(
+        root,
+        &["doc", "--workspace", "--no-deps", "--locked"],
+        &[("RUSTDOCFLAGS", "-D warnings")],
+    )
+}
+
+/// Goes on after a failed step, so that one run tells of everything.
+fn test(root: &Path) -> Step {
+    run_all(&[
+        ("format", &|| cargo(root, &["fmt", "--all", "--check"])),
+        ("lints", &|| lint(root)),
+        ("names", &|| names::check(root)),
+        ("tests", &|| tests::run(root)),
+    ])
+}

@@ -1,4 +1,7 @@
 //! The feed table: what is certified, simulated, stored and sent.
 
+pub mod file;
 pub mod job;
+pub mod messages;
+pub mod pack;
 pub mod table;

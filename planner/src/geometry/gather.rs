@@ -250,7 +250,7 @@ impl Tail {
 fn is_exact(corner: Corner) -> bool {
     match corner {
         Corner::Stop | Corner::Exact => true,
-        Corner::Within(tolerance) => tolerance <= 0.0,
+        Corner::Within { tolerance_mm, .. } => tolerance_mm <= 0.0,
     }
 }
 
@@ -258,7 +258,7 @@ fn is_exact(corner: Corner) -> bool {
 fn tolerance(m: &Move, settings: &PathSettings, metric: &Metric) -> f64 {
     let asked = match m.corner {
         _ if m.kind == MoveKind::Rapid => settings.rapid_tolerance_mm,
-        Corner::Within(tolerance) if tolerance > 0.0 => tolerance,
+        Corner::Within { tolerance_mm, .. } if tolerance_mm > 0.0 => tolerance_mm,
         _ => settings.exact_tolerance_mm,
     };
     asked.max(metric.tightest())
@@ -271,7 +271,7 @@ fn check(m: &Move) -> Result<(), GeometryError> {
         Shape::Arc(a) => [a.centre[0], a.centre[1], a.radius, a.radius_change, a.start_angle, a.sweep],
     };
     let corner = match m.corner {
-        Corner::Within(tolerance) => tolerance,
+        Corner::Within { tolerance_mm, .. } => tolerance_mm,
         _ => 0.0,
     };
     let feed = match m.feed {

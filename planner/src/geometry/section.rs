@@ -1,5 +1,7 @@
 //! A section: a stretch of path between two rests, with all that the feed problem needs to know about it.
 
+use serde::{Deserialize, Serialize};
+
 use super::grid_path::GridPath;
 use crate::job::program::{MoveKind, StopCause};
 
@@ -27,6 +29,14 @@ pub struct Marks {
     pub end: StopCause,
 }
 
+impl Marks {
+    /// The program line that made the place `u` [grid steps]; the last one beyond the end.
+    pub fn line_at(&self, u: f64) -> u32 {
+        let k = self.blocks.partition_point(|b| (b.until as f64) < u);
+        self.blocks.get(k).or(self.blocks.last()).map_or(0, |b| b.line)
+    }
+}
+
 /// A cap on the speed along a part of the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeedCap {
@@ -37,7 +47,7 @@ pub struct FeedCap {
 }
 
 /// How fast the path may be travelled, besides the axis limits.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum SpeedCap {
     /// No cap.
     None,
@@ -62,7 +72,7 @@ pub struct BlockMark {
 }
 
 /// Distance between the path and the programmed contour, both directions.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Deviation {
     /// Allowed [mm], the largest value in force in the section.
     pub tolerance_mm: f64,

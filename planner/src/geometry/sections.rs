@@ -42,7 +42,7 @@ impl PathSettings {
     pub fn of(machine: &Machine) -> Self {
         let span = |limits: fn(&Axis) -> AxisLimits| shortest_rest_span(machine.axes.iter().map(limits));
         Self {
-            exact_tolerance_mm: 0.001,
+            exact_tolerance_mm: machine.exact_path_mm,
             rapid_tolerance_mm: machine.tolerance_mm,
             longest_span_mm: 4.0,
             feed_rest_span: span(|a| a.limits),

@@ -1,5 +1,7 @@
 //! The machine: its axes, their limits, their drives.
 
+use serde::{Deserialize, Serialize};
+
 /// Most axes one job can move.
 pub const MAX_AXES: usize = 9;
 
@@ -17,6 +19,10 @@ pub struct Machine {
     pub tolerance_mm: f64,
     /// Path tolerance of the rotary axes [axis unit].
     pub tolerance_rotary: f64,
+    /// Path tolerance of G64 without P [mm].
+    pub best_speed_mm: f64,
+    /// How far exact path mode (G61) may leave the contour [mm].
+    pub exact_path_mm: f64,
     /// Joints of blocks when the program says nothing.
     pub corner: CornerMode,
     /// The axes, in the order of the file; at most [`MAX_AXES`].
@@ -73,7 +79,7 @@ pub struct Axis {
 }
 
 /// How an axis moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AxisKind {
     /// A slide; positions in millimetres.
     Linear,
@@ -82,7 +88,7 @@ pub enum AxisKind {
 }
 
 /// Unit of an axis position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Unit {
     /// Millimetre.
     Mm,
@@ -93,7 +99,7 @@ pub enum Unit {
 }
 
 /// Velocity, acceleration and jerk bounds of one axis, symmetric, per second^n in the axis unit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AxisLimits {
     /// Largest |velocity|.
     pub velocity: f64,

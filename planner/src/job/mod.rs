@@ -1,4 +1,7 @@
 //! What a user hands in: machine files and part programs.
 
+pub mod gcode;
 pub mod machine;
+pub mod machine_error;
+mod machine_file;
 pub mod program;

@@ -1,5 +1,7 @@
 //! A part program as the planner sees it: a stream of moves, dwells and stops, whatever language it came in.
 
+use serde::{Deserialize, Serialize};
+
 use super::machine::Point;
 
 /// One thing the machine has to do, in program order.
@@ -50,7 +52,7 @@ pub struct Move {
 }
 
 /// Rapid or feed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MoveKind {
     /// As fast as the axes' rapid limits allow, on a straight line in axis space.
     Rapid,
@@ -100,12 +102,30 @@ pub enum Corner {
     Stop,
     /// G61: programmed points are hit; rest only where the direction changes.
     Exact,
-    /// G64 and defaults: stay within this distance of the programmed contour [mm], nothing more.
-    Within(f64),
+    /// G64 and defaults: stay within this distance of the programmed contour, nothing more.
+    Within {
+        /// The distance [mm].
+        tolerance_mm: f64,
+        /// Who asked for it.
+        source: ToleranceSource,
+    },
+}
+
+/// Who set a path tolerance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ToleranceSource {
+    /// G64 P in the program.
+    Program,
+    /// The machine file; the program says nothing.
+    Machine,
+    /// The command line, over program and machine.
+    CommandLine,
+    /// G64 without P: the machine's best-speed tolerance.
+    BestSpeed,
 }
 
 /// Why motion comes to rest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum StopCause {
     /// M0, M1, M60.
     ProgramStop,

@@ -1,3 +1,194 @@
 //! Time-optimal path parameterisation: the fastest motion along a path under its limits.
+//!
+//! [`plan`] sweeps the path for velocity and acceleration ([`sweep`]), places the q knots by the speed found, writes
+//! every limit as Bernstein rows in the control values of q, solves for minimum time under true jerk, rounds the
+//! control values to the table's codes and checks the rounded values against every row again.
 
+mod check;
+mod clarabel;
+mod error;
+mod ipm;
+mod knots;
+mod layout;
 pub mod problem;
+mod rest;
+mod rounding;
+mod rows;
+mod start;
+pub mod sweep;
+#[cfg(test)]
+mod tests;
+mod window;
+
+pub use error::{LimitKind, PathFault, PlanError};
+
+use layout::{Derivatives, Layout, Pieces, strictest};
+use problem::{Plan, Problem, Settings, Solver};
+use crate::job::machine::AxisLimits;
+use rows::RowSource;
+use sweep::Sweep;
+
+/// Rounds of dividing spans that the format does not allow.
+const MOST_REFINEMENTS: usize = 6;
+/// Rounds of making the codes finer at the expense of top speed.
+const MOST_RESCALES: usize = 6;
+/// Headroom of the codes above the swept q.
+const CEILING: f64 = 1.1;
+
+/// Finds the fastest motion from rest to rest along a path, rounded.
+///
+/// The rounded table keeps every limit everywhere, by Bernstein bounds. Time and memory grow linearly with the path.
+///
+/// # Errors
+///
+/// [`PlanError`] names what makes the problem one without an answer, and where.
+pub fn plan(problem: &Problem, settings: &Settings) -> Result<Plan, PlanError> {
+    error::validate(problem)?;
+    validate_settings(settings)?;
+    let limits = slowed(problem);
+    let problem = &Problem { limits: &limits, ..*problem };
+    let sweep = Sweep::new(problem);
+    let mut layout = knots::place(problem, settings, &sweep)?;
+    let mut iterations = 0;
+    for _ in 0..MOST_REFINEMENTS {
+        let plan = solve(problem, settings, &sweep, &layout, &mut iterations)?;
+        if std::env::var("DBG").is_ok() {
+            for i in 0..plan.table.spans() {
+                println!("{i} h {:.3e} {:?} T {:.3e} {:?}", layout.h[i], plan.table.law(i), plan.table.law(i).duration(), plan.binding[i]);
+            }
+            println!();
+        }
+        let Some(parts) = check::format(&layout, &plan.table) else {
+            return Ok(Plan { iterations, ..plan });
+        };
+        layout = knots::refine(problem.path, &layout, &parts)
+            .map_err(|span| format_error(problem, &layout, &plan, span))?;
+    }
+    let plan = solve(problem, settings, &sweep, &layout, &mut iterations)?;
+    match check::format(&layout, &plan.table) {
+        None => Ok(Plan { iterations, ..plan }),
+        Some(parts) => {
+            let span = parts.iter().position(|&p| p > 1).unwrap_or(0);
+            Err(format_error(problem, &layout, &plan, span))
+        }
+    }
+}
+
+/// The limits, jerk lowered where a move would else be over in so few ticks that its spans could not last one each:
+/// rest to rest under jerk alone takes T with L = J T^3/32.
+fn slowed(problem: &Problem) -> Vec<AxisLimits> {
+    const FEWEST_TICKS: f64 = 8.0;
+    let shortest = FEWEST_TICKS * problem.shortest_span_s;
+    problem
+        .limits
+        .iter()
+        .zip(&problem.path.axes)
+        .map(|(l, axis)| {
+            let travel = axis.controls.windows(2).map(|c| c[1].abs_diff(c[0]) as f64).sum::<f64>() * axis.lsb;
+            let ruled = 32.0 * travel / shortest.powi(3);
+            // Where acceleration saturates under that jerk, the move takes longer anyway.
+            let rules = travel > 0.0 && ruled < l.jerk && 0.25 * shortest * ruled < l.acceleration;
+            AxisLimits { jerk: if rules { ruled } else { l.jerk }, ..*l }
+        })
+        .collect()
+}
+
+fn format_error(problem: &Problem, layout: &Layout, plan: &Plan, span: usize) -> PlanError {
+    let u = layout.start(problem.path, span);
+    let seconds = plan.table.law(span).duration();
+    if seconds >= 1.0 { PlanError::Slow { span, u, seconds } } else { PlanError::Uneven { span, u } }
+}
+
+fn validate_settings(settings: &Settings) -> Result<(), PlanError> {
+    let sound = |v: f64| v > 0.0 && v.is_finite();
+    if !sound(settings.relative_gap) {
+        return Err(PlanError::Setting { name: "relative_gap", value: settings.relative_gap });
+    }
+    if !sound(settings.spans_per_ramp) {
+        return Err(PlanError::Setting { name: "spans_per_ramp", value: settings.spans_per_ramp });
+    }
+    Ok(())
+}
+
+/// Solves on given knots, rounds and checks.
+fn solve(
+    problem: &Problem,
+    settings: &Settings,
+    sweep: &Sweep,
+    layout: &Layout,
+    iterations: &mut u64,
+) -> Result<Plan, PlanError> {
+    let unit = sweep.q.iter().copied().fold(0.0, f64::max);
+    let mut source =
+        RowSource { problem: *problem, layout, unit, ceiling: CEILING, joint: joints(problem, layout).map(|q| q / unit) };
+    let mut worst = 1;
+    for _ in 0..MOST_RESCALES {
+        source.joint = joints(problem, layout).map(|q| (q / unit).min(source.ceiling));
+        let scale = rounding::scale(unit, source.ceiling);
+        let half = rounding::halves(&source, scale, sweep);
+        let x = optimise(&source, settings, sweep, &half, iterations)?;
+        let table = rounding::table(&source, scale, &x);
+        let rounded = rounding::values(&source, &table);
+        let findings = check::rows(&source, &rounded, &half);
+        if findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC {
+            return Ok(Plan { table, binding: findings.binding, iterations: 0 });
+        }
+        worst = findings.span;
+        // Rounding alone breaks a limit: the codes are too coarse for the slowest places. Half the top speed makes
+        // them twice as fine.
+        source.ceiling *= 0.25;
+    }
+    Err(PlanError::Resolution { span: worst, u: layout.start(problem.path, worst) })
+}
+
+/// Control values of minimum time.
+fn optimise(
+    source: &RowSource,
+    settings: &Settings,
+    sweep: &Sweep,
+    half: &[f64],
+    iterations: &mut u64,
+) -> Result<Vec<f64>, PlanError> {
+    let mut x = start::profile(source);
+    match settings.solver {
+        Solver::InteriorPoint => {
+            *iterations += window::solve(source, &mut x, half, settings.relative_gap).ok_or(PlanError::Solver)?;
+            Ok(x)
+        }
+        Solver::Clarabel => {
+            let (layout, path) = (source.layout, source.problem.path);
+            let mut hint = 0;
+            let swept: Vec<f64> = (1..layout.spans() - 1)
+                .map(|i| {
+                    let (from, to) = (layout.start(path, i), layout.start(path, i + 1));
+                    sweep.largest(from, to, &mut hint) / source.unit
+                })
+                .collect();
+            let (x, count) =
+                clarabel::solve(source, &swept, &x, half, settings.relative_gap).ok_or(PlanError::Solver)?;
+            *iterations += count;
+            Ok(x)
+        }
+    }
+}
+
+/// Bounds on q at the joints with both rest spans.
+fn joints(problem: &Problem, layout: &Layout) -> [f64; 2] {
+    let path = problem.path;
+    let mut pieces = Pieces::new(path);
+    let n = layout.spans();
+    [0, n - 1].map(|i| {
+        let g = layout.geometry[i] as usize;
+        let offset = (layout.knots[i] - path.breaks[g]) as f64 * path.step;
+        let derivatives: Vec<Derivatives> = pieces
+            .at(g)
+            .iter()
+            .map(|p| {
+                let d = Derivatives::of(p, offset, layout.h[i]);
+                if i == 0 { d } else { d.reversed() }
+            })
+            .collect();
+        let caps = strictest(problem.caps, layout.knots[i], layout.knots[i + 1]);
+        rest::joint_bound(layout.h[i], &derivatives, problem.limits, &caps, problem.shortest_span_s)
+    })
+}

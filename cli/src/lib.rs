@@ -1,0 +1,72 @@
+//! The `feedspline` command: its words, its messages, its report and its JSON.
+//!
+//! [`args`] reads the command line, [`verbs`] holds one file per verb, [`engine`] is what they ask of the
+//! planner and the simulator. Results leave as [`json`] objects, a [`summary`] for people, and the HTML
+//! [`report`].
+
+pub mod args;
+pub mod console;
+pub mod engine;
+pub mod failure;
+pub mod json;
+pub mod local;
+pub mod memory;
+pub mod output;
+pub mod progress;
+pub mod report;
+pub mod summary;
+pub mod verbs;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Cli, Verb};
+use console::Console;
+use engine::Engine;
+
+/// Exit status of bad input and of a wrong command line.
+pub const EXIT_BAD_INPUT: u8 = 2;
+
+/// Exit status when the certificate does not hold, and of internal errors.
+pub const EXIT_FAILED: u8 = 1;
+
+/// Runs the command line and says how it went.
+pub fn main(args: impl IntoIterator<Item = OsString>, engine: &dyn Engine) -> ExitCode {
+    ExitCode::from(status(args, engine, &mut std::io::stdout(), &mut std::io::stderr()))
+}
+
+/// As [`main`], writing to the given streams and returning the exit status.
+pub fn status(
+    args: impl IntoIterator<Item = OsString>,
+    engine: &dyn Engine,
+    out: &mut dyn std::io::Write,
+    err: &mut dyn std::io::Write,
+) -> u8 {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(error) => {
+            let status = if error.use_stderr() { EXIT_BAD_INPUT } else { 0 };
+            let text = error.render();
+            // A closed stream leaves nobody to tell.
+            let _ = if status == 0 { write!(out, "{text}") } else { write!(err, "{text}") };
+            return status;
+        }
+    };
+    let mut console = Console::new(out, err, cli.verb.talk());
+    let result = match &cli.verb {
+        Verb::Plan(args) => verbs::plan::execute(args, engine, &mut console),
+        Verb::Run(args) => verbs::run::execute(args, engine, &mut console),
+        Verb::Verify(args) => verbs::verify::execute(args, engine, &mut console),
+        Verb::Inspect(args) => verbs::inspect::execute(args, engine, &mut console),
+    };
+    match result {
+        Ok(verbs::Verdict::Holds) => 0,
+        Ok(verbs::Verdict::Broken) => EXIT_FAILED,
+        Err(failure) => {
+            console.fail(&failure);
+            failure.exit_status()
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! What a verb prints for people: one aligned column of names, one of values.
+
+use crate::json::{CertificateJson, InspectJson, PlanJson, VerifyJson};
+use crate::report::words::{bytes, count, duration, length, times};
+
+/// The summary of `plan` and `run`.
+pub fn plan(p: &PlanJson) -> String {
+    let mut s = Sheet::new(&format!("{} on {}", p.job, p.machine));
+    let mut kinds = vec![format!("{} lines", count(p.lines)), format!("{} arcs", count(p.arcs))];
+    if p.splines > 0 {
+        kinds.push(format!("{} splines", count(p.splines)));
+    }
+    kinds.push(format!("{} rapids", count(p.rapids)));
+    s.row("program", &format!("{} blocks: {}", count(p.blocks), kinds.join(", ")));
+    s.row("length", &format!("{} feed, {} rapid", length(p.feed_length_mm), length(p.rapid_length_mm)));
+    s.row("stops", &format!("{}, {} dwells", count(p.stops), count(p.dwells)));
+    s.row("cycle time", &format!("{} ({} in motion)", duration(p.cycle_time_s), duration(p.motion_time_s)));
+    s.row("at constant feed", &duration(p.constant_feed_time_s));
+    if let Some(stop) = p.stop_every_block_time_s {
+        let gain = if p.motion_time_s > 0.0 { stop / p.motion_time_s } else { 1.0 };
+        s.row("stop at each block", &format!("{} ({} as long)", duration(stop), times(gain)));
+    }
+    let (bound, allowed) = (p.max_deviation_mm, p.tolerance_mm);
+    s.row("deviation", &format!("{bound:.4} mm of {allowed} mm allowed ({})", p.tolerance_source));
+    let per_second = p.table_bytes as f64 / p.motion_time_s.max(f64::MIN_POSITIVE);
+    let rate = if p.motion_time_s > 0.0 { format!(", {per_second:.0} B/s") } else { String::new() };
+    s.row("table", &format!("{} in {} spans{rate}", bytes(p.table_bytes), count(p.spans)));
+    s.certificate(&p.certificate);
+    if let Some(sim) = &p.simulation {
+        let end = if sim.at_end { "at the end point, at rest" } else { "NOT at the end point" };
+        s.row("simulated drives", &format!("{} set-points, {end}", count(sim.setpoints)));
+        let (max, rms) = (sim.max_following_error_mm, sim.rms_following_error_mm);
+        s.row("following error", &format!("{max:.4} mm at most, {rms:.4} mm rms"));
+    }
+    let memory = p.peak_memory_mib.map(|m| format!(", {m:.0} MiB")).unwrap_or_default();
+    s.row("planned in", &format!("{}{memory}", duration(p.plan_seconds)));
+    for note in p.notes.iter().take(NOTES) {
+        s.row("note", &format!("line {}: {}", note.line, note.text));
+    }
+    if p.notes.len() > NOTES {
+        s.row("", &format!("and {} more, all in the report", p.notes.len() - NOTES));
+    }
+    if let Some(feed) = &p.files.feed {
+        s.row("feed table", feed);
+    }
+    if let Some(report) = &p.files.report {
+        s.row("report", report);
+    }
+    s.text
+}
+
+/// The summary of `verify`.
+pub fn verify(v: &VerifyJson) -> String {
+    let mut s = Sheet::new(&v.file);
+    s.row("motion", &format!("{} in {} sections", duration(v.motion_time_s), count(v.sections)));
+    s.row("proven", &format!("{} spans in {}", count(v.spans), duration(v.verify_seconds)));
+    for axis in &v.axes {
+        let jerk = axis.jerk_ratio.map(|j| format!("  j {j:.6}")).unwrap_or_default();
+        s.row(
+            &format!("axis {}", axis.name),
+            &format!("v {:.6}  a {:.6}{jerk}", axis.velocity_ratio, axis.acceleration_ratio),
+        );
+    }
+    s.certificate(&v.certificate);
+    s.text
+}
+
+/// The summary of `inspect`.
+pub fn inspect(i: &InspectJson) -> String {
+    let mut s = Sheet::new(&i.file);
+    s.row("format", &format!("version {}, schema {}", i.format_version, i.schema_hash));
+    s.row("size", &format!("{} file, {} tables", bytes(i.file_bytes), bytes(i.table_bytes)));
+    s.row("sections", &format!("{}, {} dwells", count(i.sections), count(i.dwells)));
+    s.row("spans", &format!("{} of q, {} of geometry", count(i.spans), count(i.geometry_spans)));
+    s.row("cycle time", &format!("{} ({} in motion)", duration(i.cycle_time_s), duration(i.motion_time_s)));
+    s.row("control tick", &format!("{} ms", i.control_tick_s * 1e3));
+    s.row("shared part", &bytes(i.shared_bytes));
+    for axis in &i.axes {
+        let (start, end) = (axis.start_counts, axis.end_counts);
+        let scale = axis.counts_per_unit;
+        s.row(
+            &format!("axis {}", axis.name),
+            &format!("{}, counts {start} to {end}, {scale} per {}", bytes(axis.bytes), axis.unit),
+        );
+    }
+    s.text
+}
+
+/// Most notes a summary lists.
+const NOTES: usize = 5;
+
+/// Lines of `name  value` under a heading.
+struct Sheet {
+    text: String,
+}
+
+impl Sheet {
+    fn new(heading: &str) -> Self {
+        Sheet { text: format!("{}\n", printable(heading)) }
+    }
+
+    fn row(&mut self, name: &str, value: &str) {
+        self.text.push_str(&format!("  {name:<19} {}\n", printable(value)));
+    }
+
+    fn certificate(&mut self, c: &CertificateJson) {
+        let mut ratios = format!("v {:.6}, a {:.6}", c.velocity_ratio, c.acceleration_ratio);
+        for (name, ratio) in [("j", c.jerk_ratio), ("feed", c.feed_ratio)] {
+            if let Some(ratio) = ratio {
+                ratios.push_str(&format!(", {name} {ratio:.6}"));
+            }
+        }
+        let verdict = if c.holds { "holds" } else { "DOES NOT HOLD" };
+        self.row("certificate", &format!("{verdict}: {ratios} of the limits"));
+    }
+}
+
+/// Text from files without control characters: a comment must not steer the terminal.
+fn printable(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}

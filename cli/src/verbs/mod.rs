@@ -1,0 +1,22 @@
+//! One file per verb.
+
+pub mod inspect;
+pub mod plan;
+pub mod run;
+pub mod verify;
+
+/// How a verb ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Done, and every limit proven.
+    Holds,
+    /// Done, but the certificate does not hold.
+    Broken,
+}
+
+impl Verdict {
+    /// The verdict of a certificate.
+    pub fn of(holds: bool) -> Self {
+        if holds { Verdict::Holds } else { Verdict::Broken }
+    }
+}

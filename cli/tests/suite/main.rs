@@ -1,0 +1,8 @@
+//! The command through its public door: verbs, files, report.
+
+#[cfg(test)]
+mod report;
+#[cfg(test)]
+mod sample;
+#[cfg(test)]
+mod verbs;

@@ -1,0 +1,285 @@
+//! The verbs on a scripted engine: files, streams, exit status, JSON.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use cli::args::{PlanArgs, RunArgs};
+use cli::engine::{Engine, Outcome};
+use cli::failure::{Failure, Place};
+use cli::json::{AxisRatiosJson, CertificateJson, InspectAxisJson, InspectJson, VerifyJson};
+use cli::progress::Progress;
+use serde_json::Value;
+
+use crate::sample;
+
+/// An engine that answers as told.
+struct Scripted {
+    holds: bool,
+    fails: bool,
+}
+
+impl Scripted {
+    fn outcome(&self, simulated: bool) -> Result<Outcome, Failure> {
+        if self.fails {
+            return Err(Failure::input("feed is zero")
+                .at(Path::new("part.ngc"), Place::new(7, 5, 2, b"G1 X1 F0"))
+                .with_help("Program a feed above zero."));
+        }
+        let mut outcome = sample::outcome(simulated);
+        outcome.json.certificate.holds = self.holds;
+        Ok(outcome)
+    }
+
+    fn certificate(&self) -> CertificateJson {
+        CertificateJson {
+            holds: self.holds,
+            velocity_ratio: 0.9,
+            acceleration_ratio: 1.0,
+            jerk_ratio: None,
+            feed_ratio: None,
+        }
+    }
+}
+
+impl Engine for Scripted {
+    fn plan(&self, _: &PlanArgs, _: &mut Progress) -> Result<Outcome, Failure> {
+        self.outcome(false)
+    }
+
+    fn run(&self, args: &RunArgs, trace: &mut dyn Write, _: &mut Progress) -> Result<Outcome, Failure> {
+        writeln!(trace, "every,{}", args.trace_every).map_err(|e| Failure::internal(e.to_string()))?;
+        self.outcome(true)
+    }
+
+    fn verify(&self, file: &Path, _: &mut Progress) -> Result<VerifyJson, Failure> {
+        let name = "X".into();
+        let axis = AxisRatiosJson { name, velocity_ratio: 0.9, acceleration_ratio: 1.0, jerk_ratio: None };
+        Ok(VerifyJson {
+            file: file.display().to_string(),
+            sections: 2,
+            spans: 40,
+            motion_time_s: 1.5,
+            certificate: self.certificate(),
+            axes: vec![axis],
+            verify_seconds: 0.01,
+        })
+    }
+
+    fn inspect(&self, file: &Path) -> Result<InspectJson, Failure> {
+        let axis = InspectAxisJson {
+            name: "X".into(),
+            unit: "mm".into(),
+            counts_per_unit: 1e4,
+            start_counts: 0,
+            end_counts: -5,
+            bytes: 40,
+        };
+        Ok(InspectJson {
+            file: file.display().to_string(),
+            file_bytes: 200,
+            format_version: 1,
+            schema_hash: "00112233aabbccdd".into(),
+            control_tick_s: 1e-3,
+            sections: 2,
+            dwells: 1,
+            spans: 40,
+            geometry_spans: 12,
+            cycle_time_s: 2.5,
+            motion_time_s: 1.5,
+            table_bytes: 150,
+            shared_bytes: 110,
+            axes: vec![axis],
+        })
+    }
+}
+
+struct Said {
+    status: u8,
+    out: String,
+    err: String,
+}
+
+fn say(engine: &Scripted, words: &[&str]) -> Said {
+    let (mut out, mut err) = (Vec::new(), Vec::new());
+    let args = ["feedspline"].iter().chain(words).map(Into::into);
+    let status = cli::status(args.collect::<Vec<_>>(), engine, &mut out, &mut err);
+    Said { status, out: String::from_utf8(out).unwrap(), err: String::from_utf8(err).unwrap() }
+}
+
+fn json(said: &Said) -> Value {
+    serde_json::from_str(&said.out).unwrap()
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    value.as_object().unwrap().keys().map(String::as_str).collect()
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+const GOOD: Scripted = Scripted { holds: true, fails: false };
+const BROKEN: Scripted = Scripted { holds: false, fails: false };
+const BAD_INPUT: Scripted = Scripted { holds: true, fails: true };
+
+#[test]
+fn run_writes_table_plan_report_and_trace() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("out");
+    let said = say(&GOOD, &["run", "jobs/part.ngc", "-o", folder.to_str().unwrap(), "--trace-every", "4"]);
+    assert_eq!((said.status, said.err.as_str()), (0, ""));
+    assert_eq!(names(&folder), ["part.feed", "plan.json", "report.html", "trace.csv"]);
+    assert_eq!(fs::read_to_string(folder.join("trace.csv")).unwrap(), "every,4\n");
+    assert_eq!(fs::read(folder.join("part.feed")).unwrap(), b"a feed table");
+    assert!(said.out.contains("cycle time") && said.out.contains("report.html"), "{}", said.out);
+}
+
+#[test]
+fn json_on_standard_output_is_the_plan_file() {
+    let home = tempfile::tempdir().unwrap();
+    let said = say(&GOOD, &["run", "part.ngc", "--json", "-o", home.path().to_str().unwrap()]);
+    let file: Value = serde_json::from_slice(&fs::read(home.path().join("plan.json")).unwrap()).unwrap();
+    assert_eq!(json(&said), file);
+}
+
+#[test]
+fn field_names_of_plan_and_run_are_pinned() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().to_str().unwrap();
+    let run = json(&say(&GOOD, &["run", "part.ngc", "--json", "-o", folder]));
+    let mut expected: Vec<&str> = "job machine axes blocks rapids lines arcs splines dwells stops feed_length_mm \
+        rapid_length_mm bounding_box_mm tolerance_mm tolerance_source max_deviation_mm cycle_time_s motion_time_s \
+        constant_feed_time_s stop_every_block_time_s spans table_bytes plan_seconds peak_memory_mib solver \
+        certificate simulation notes files"
+        .split_whitespace()
+        .collect();
+    expected.sort_unstable();
+    let mut found = keys(&run);
+    found.sort_unstable();
+    assert_eq!(found, expected);
+    assert_eq!(keys(&run["bounding_box_mm"]), ["max", "min"]);
+    let ratios = ["acceleration_ratio", "feed_ratio", "holds", "jerk_ratio", "velocity_ratio"];
+    assert_eq!(keys(&run["certificate"]), ratios);
+    let simulation = [
+        "at_end",
+        "max_following_error_mm",
+        "max_path_deviation_counts",
+        "real_time_factor",
+        "rms_following_error_mm",
+        "setpoint_hash",
+        "setpoints",
+    ];
+    assert_eq!(keys(&run["simulation"]), simulation);
+    assert_eq!(keys(&run["files"]), ["feed", "plan", "report", "trace"]);
+    let plan = json(&say(&GOOD, &["plan", "part.ngc", "--json", "-o", folder]));
+    assert!(plan.get("simulation").is_none() && plan["files"].get("trace").is_none());
+}
+
+#[test]
+fn field_names_of_verify_and_inspect_are_pinned() {
+    let verify = json(&say(&GOOD, &["verify", "a.feed", "--json"]));
+    let expected = ["axes", "certificate", "file", "motion_time_s", "sections", "spans", "verify_seconds"];
+    assert_eq!(keys(&verify), expected);
+    let axis = ["acceleration_ratio", "jerk_ratio", "name", "velocity_ratio"];
+    assert_eq!(keys(&verify["axes"][0]), axis);
+    let inspect = json(&say(&GOOD, &["inspect", "a.feed", "--json"]));
+    let expected = "axes control_tick_s cycle_time_s dwells file file_bytes format_version geometry_spans \
+                    motion_time_s schema_hash sections shared_bytes spans table_bytes";
+    assert_eq!(keys(&inspect), expected.split_whitespace().collect::<Vec<_>>());
+    let axis = ["bytes", "counts_per_unit", "end_counts", "name", "start_counts", "unit"];
+    assert_eq!(keys(&inspect["axes"][0]), axis);
+}
+
+#[test]
+fn every_field_is_explained_in_the_documentation() {
+    let text = include_str!("../../../docs/json.md");
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().to_str().unwrap();
+    fn check(value: &Value, text: &str) {
+        match value {
+            Value::Object(map) => {
+                for (key, inner) in map {
+                    assert!(text.contains(&format!("`{key}`")), "docs/json.md does not explain {key}");
+                    check(inner, text);
+                }
+            }
+            Value::Array(list) => list.iter().for_each(|inner| check(inner, text)),
+            _ => {}
+        }
+    }
+    check(&json(&say(&GOOD, &["run", "part.ngc", "--json", "-o", folder])), text);
+    check(&json(&say(&GOOD, &["verify", "a.feed", "--json"])), text);
+    check(&json(&say(&GOOD, &["inspect", "a.feed", "--json"])), text);
+    check(&json(&say(&BAD_INPUT, &["plan", "part.ngc", "--json", "-o", folder])), text);
+}
+
+#[test]
+fn bad_input_is_status_two_with_a_diagnostic_and_no_file() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("deep/out");
+    for verb in ["plan", "run"] {
+        let said = say(&BAD_INPUT, &[verb, "part.ngc", "-o", folder.to_str().unwrap()]);
+        assert_eq!((said.status, said.out.as_str()), (2, ""));
+        assert!(said.err.contains("part.ngc:7:5: feed is zero"), "{}", said.err);
+        assert!(said.err.contains("Program a feed above zero."), "{}", said.err);
+        assert!(names(home.path()).is_empty());
+    }
+}
+
+#[test]
+fn bad_input_in_json_is_one_object() {
+    let home = tempfile::tempdir().unwrap();
+    let said = say(&BAD_INPUT, &["plan", "part.ngc", "--json", "-o", home.path().to_str().unwrap()]);
+    assert_eq!(said.status, 2);
+    let error = &json(&said)["error"];
+    assert_eq!(error["kind"], "input");
+    assert_eq!(
+        (&error["file"], &error["line"], &error["column"]),
+        (&"part.ngc".into(), &7.into(), &5.into())
+    );
+    assert_eq!(error["message"], "feed is zero");
+    assert_eq!(error["help"], "Program a feed above zero.");
+}
+
+#[test]
+fn a_broken_certificate_is_status_one_with_a_report_and_no_table() {
+    let home = tempfile::tempdir().unwrap();
+    let said = say(&BROKEN, &["plan", "part.ngc", "-o", home.path().to_str().unwrap()]);
+    assert_eq!(said.status, 1);
+    assert_eq!(names(home.path()), ["plan.json", "report.html"]);
+    assert!(said.out.contains("DOES NOT HOLD"), "{}", said.out);
+    assert_eq!(say(&BROKEN, &["verify", "a.feed"]).status, 1);
+}
+
+#[test]
+fn quiet_says_nothing() {
+    let home = tempfile::tempdir().unwrap();
+    let said = say(&GOOD, &["plan", "part.ngc", "-q", "-o", home.path().to_str().unwrap()]);
+    assert_eq!((said.status, said.out.as_str(), said.err.as_str()), (0, "", ""));
+}
+
+#[test]
+fn usage_errors_are_status_two_and_help_is_not_an_error() {
+    assert_eq!(say(&GOOD, &["plan"]).status, 2);
+    assert_eq!(say(&GOOD, &["plan", "a.ngc", "--tolerance", "-1"]).status, 2);
+    assert_eq!(say(&GOOD, &["paln", "a.ngc"]).status, 2);
+    let help = say(&GOOD, &["run", "--help"]);
+    assert_eq!(help.status, 0);
+    assert!(help.out.contains("Example: feedspline run"));
+    assert_eq!(say(&GOOD, &["plan", ".."]).status, 2);
+}
+
+#[test]
+fn summaries_align_their_columns() {
+    let home = tempfile::tempdir().unwrap();
+    let said = say(&GOOD, &["run", "part.ngc", "-o", home.path().to_str().unwrap()]);
+    for line in said.out.lines().skip(1) {
+        let (name, value) = line.split_at(21);
+        assert!(name.ends_with(' ') && name.starts_with("  "), "{line}");
+        assert!(!value.starts_with("  "), "{line}");
+    }
+}

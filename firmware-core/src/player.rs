@@ -1,0 +1,372 @@
+//! The state machine of one axis: tables come in, are checked, armed and played.
+//!
+//! Two buffers: while one table plays, the next one comes into the other. A table is played only if it came
+//! completely, its checksums hold, it obeys the format's rules, is meant for this axis, tick and limits, and
+//! begins where the motion before it ends. Every table ends at rest, so whatever fails to arrive, the axis comes
+//! to rest on its path.
+
+use heapless::Deque;
+use protocol::message::{DriveMessage, Fault, HostMessage, Reject, State, Status};
+use protocol::table::{Limits, TableHeader};
+
+use crate::evaluate::{Cursor, Setpoint};
+use crate::store::Slot;
+use crate::time::{PathClock, ticks_until};
+
+/// Most answers that wait to be sent; when they are not fetched, status is dropped first.
+const ANSWERS: usize = 8;
+
+/// What a drive knows of itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisConfig {
+    /// Its axis, in the machine's order.
+    pub axis: u8,
+    /// Control tick [ns].
+    pub tick_ns: u32,
+    /// Position at start-up [counts].
+    pub position: i64,
+    /// Tables planned for more are refused.
+    pub limits: Limits,
+    /// Status is sent every so many ticks; 0: never.
+    pub status_ticks: u32,
+}
+
+/// Which of the two buffers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    A,
+    B,
+}
+
+/// A table that plays.
+#[derive(Clone, Copy, Debug)]
+struct Playing {
+    side: Side,
+    cursor: Cursor,
+    clock: PathClock,
+    /// Tick at which it has come to rest.
+    end: u64,
+    /// Where that is [counts].
+    position: i64,
+}
+
+/// A table that will start.
+#[derive(Clone, Copy, Debug)]
+struct Armed {
+    side: Side,
+    tick: u64,
+}
+
+/// One axis.
+#[derive(Debug)]
+pub struct Player<'a> {
+    config: AxisConfig,
+    a: Slot<'a>,
+    b: Slot<'a>,
+    /// Number of the next tick.
+    tick: u64,
+    status_in: u32,
+    position: i64,
+    playing: Option<Playing>,
+    armed: Option<Armed>,
+    has_played: bool,
+    fault: Option<Fault>,
+    answers: Deque<DriveMessage, ANSWERS>,
+}
+
+impl<'a> Player<'a> {
+    /// An axis at rest, with two buffers for tables.
+    pub fn new(config: AxisConfig, a: &'a mut [u8], b: &'a mut [u8]) -> Self {
+        Self {
+            config,
+            a: Slot::new(a),
+            b: Slot::new(b),
+            tick: 0,
+            status_in: config.status_ticks,
+            position: config.position,
+            playing: None,
+            armed: None,
+            has_played: false,
+            fault: None,
+            answers: Deque::new(),
+        }
+    }
+
+    /// Takes a message; answers wait in [`Player::poll_answer`].
+    pub fn handle(&mut self, message: &HostMessage<'_>) {
+        let (table, result) = match *message {
+            HostMessage::Open(header) => (header.table, self.open(header)),
+            HostMessage::OpenAxis(axis) => {
+                (axis.table, self.incoming(axis.table, |slot| slot.open_axis(axis)))
+            }
+            HostMessage::Data { table, part, offset, bytes } => {
+                (table, self.incoming(table, |slot| slot.data(part, offset, bytes)))
+            }
+            HostMessage::Seal { table, part, crc } => {
+                let complete = self.incoming(table, |slot| slot.seal(part, crc));
+                (table, complete.and_then(|complete| if complete { self.check(table) } else { Ok(()) }))
+            }
+            HostMessage::Start { table, tick } => (table, self.start(table, tick)),
+            HostMessage::Stop => {
+                self.armed = None;
+                self.clear_unused();
+                return;
+            }
+        };
+        if let Err(reason) = result {
+            self.answer(DriveMessage::Reject { table, reason });
+        }
+    }
+
+    /// The set-point of this tick; call it once per control tick.
+    pub fn tick(&mut self) -> Setpoint {
+        self.begin();
+        let setpoint = match self.play() {
+            Ok(setpoint) => setpoint,
+            Err(fault) => {
+                self.fault = Some(fault);
+                (self.playing, self.armed) = (None, None);
+                Setpoint::at_rest(self.position)
+            }
+        };
+        self.position = setpoint.position;
+        self.tick = self.tick.saturating_add(1);
+        if self.config.status_ticks > 0 {
+            self.status_in = self.status_in.saturating_sub(1);
+            if self.status_in == 0 {
+                self.status_in = self.config.status_ticks;
+                let status = self.status();
+                if self.answers.len() < ANSWERS / 2 {
+                    self.answer(DriveMessage::Status(status));
+                }
+            }
+        }
+        setpoint
+    }
+
+    /// The oldest answer that was not fetched.
+    pub fn poll_answer(&mut self) -> Option<DriveMessage> {
+        self.answers.pop_front()
+    }
+
+    /// How the axis is.
+    pub fn status(&self) -> Status {
+        let after = |end: u64| end.saturating_sub(self.tick);
+        let armed_end = self.armed.and_then(|armed| {
+            let table = self.slot(armed.side).checked()?;
+            Some(armed.tick.saturating_add(ticks_until(table.duration(), self.config.tick_ns)))
+        });
+        let end = armed_end.or(self.playing.map(|p| p.end)).unwrap_or(self.tick);
+        Status {
+            state: self.state(),
+            fault: self.fault,
+            tick: self.tick,
+            position: self.position,
+            fill: after(end),
+        }
+    }
+
+    fn state(&self) -> State {
+        let (a, b) = (self.a.number(), self.b.number());
+        if self.fault.is_some() {
+            State::Fault
+        } else if self.playing.is_some() {
+            State::Running
+        } else if self.armed.is_some() {
+            State::Armed
+        } else if self.a.is_ready() || self.b.is_ready() {
+            State::Ready
+        } else if a.is_some() || b.is_some() {
+            State::Receiving
+        } else if self.has_played {
+            State::Holding
+        } else {
+            State::Idle
+        }
+    }
+
+    /// At the tick of the start, the armed table becomes the one that plays.
+    fn begin(&mut self) {
+        let Some(armed) = self.armed.filter(|armed| armed.tick <= self.tick) else { return };
+        self.armed = None;
+        if let Some(before) = self.playing.take() {
+            self.slot_mut(before.side).clear();
+        }
+        let Some(table) = self.slot(armed.side).checked() else { return };
+        let (number, position) = (table.header().table, table.axis().end);
+        let ticks = ticks_until(table.duration(), self.config.tick_ns);
+        match Cursor::new(&table) {
+            Ok(cursor) => {
+                let clock = PathClock::new(self.config.tick_ns);
+                let end = armed.tick.saturating_add(ticks);
+                self.playing = Some(Playing { side: armed.side, cursor, clock, end, position });
+            }
+            Err(error) => self.fault = Some(Fault::Table { table: number, error }),
+        }
+    }
+
+    fn play(&mut self) -> Result<Setpoint, Fault> {
+        let Some(mut playing) = self.playing else { return Ok(Setpoint::at_rest(self.position)) };
+        let slot = self.slot(playing.side);
+        let Some(table) = slot.checked() else { return Ok(Setpoint::at_rest(self.position)) };
+        let setpoint = playing
+            .cursor
+            .evaluate(&table, playing.clock.time())
+            .map_err(|error| Fault::Table { table: table.header().table, error })?;
+        playing.clock.advance();
+        if setpoint.done {
+            self.slot_mut(playing.side).clear();
+            self.has_played = true;
+            self.playing = None;
+        } else {
+            self.playing = Some(playing);
+        }
+        Ok(setpoint)
+    }
+
+    fn open(&mut self, header: TableHeader) -> Result<(), Reject> {
+        self.refuse_in_fault()?;
+        self.clear_unused();
+        if header.tick_ns != self.config.tick_ns {
+            return Err(Reject::Tick { tick_ns: self.config.tick_ns });
+        }
+        if self.side_of(header.table).is_some() {
+            return Err(Reject::Busy);
+        }
+        let side = [Side::A, Side::B].into_iter().find(|side| !self.is_used(*side)).ok_or(Reject::Busy)?;
+        self.slot_mut(side).open(header)
+    }
+
+    /// Does something to the table that is coming in.
+    fn incoming<T>(
+        &mut self,
+        table: u32,
+        act: impl FnOnce(&mut Slot<'a>) -> Result<T, Reject>,
+    ) -> Result<T, Reject> {
+        self.refuse_in_fault()?;
+        let side = self.side_of(table).filter(|side| !self.is_used(*side)).ok_or(Reject::NotOpen)?;
+        act(self.slot_mut(side))
+    }
+
+    /// Checks a complete table, and says so.
+    fn check(&mut self, number: u32) -> Result<(), Reject> {
+        let config = self.config;
+        let position = self.next_position();
+        let fits = |slot: &mut Slot<'_>| {
+            let (_, axis) = slot.headers().ok_or(Reject::NotOpen)?;
+            if axis.axis != config.axis {
+                return Err(Reject::Axis { axis: config.axis });
+            }
+            if !is_within(&axis.limits, &config.limits) {
+                return Err(Reject::Limits);
+            }
+            if axis.start != position {
+                return Err(Reject::Position { position });
+            }
+            let ticks = ticks_until(slot.check()?.duration(), config.tick_ns);
+            let crc = slot.seals().ok_or(Reject::NotReady)?;
+            Ok(DriveMessage::Ready { table: number, ticks, crc })
+        };
+        let result = self.incoming(number, fits);
+        match result {
+            Ok(ready) => {
+                self.answer(ready);
+                Ok(())
+            }
+            Err(reason) => {
+                if let Some(side) = self.side_of(number) {
+                    self.slot_mut(side).clear();
+                }
+                Err(reason)
+            }
+        }
+    }
+
+    fn start(&mut self, number: u32, tick: u64) -> Result<(), Reject> {
+        self.refuse_in_fault()?;
+        let side = self.side_of(number).ok_or(Reject::NotReady)?;
+        if self.playing.is_some_and(|p| p.side == side) {
+            return Ok(());
+        }
+        if let Some(armed) = self.armed {
+            let repeated = armed.side == side && armed.tick == tick;
+            return if repeated { Ok(()) } else { Err(Reject::Busy) };
+        }
+        let start = self.slot(side).checked().ok_or(Reject::NotReady)?.axis().start;
+        if tick < self.tick {
+            return Err(Reject::Late { tick: self.tick });
+        }
+        if let Some(playing) = self.playing
+            && tick < playing.end
+        {
+            return Err(Reject::Overlap { tick: playing.end });
+        }
+        let position = self.next_position();
+        if start != position {
+            return Err(Reject::Position { position });
+        }
+        self.armed = Some(Armed { side, tick });
+        Ok(())
+    }
+
+    /// Where the axis will stand when all that it must still play has been played [counts].
+    fn next_position(&self) -> i64 {
+        let armed = self.armed.and_then(|armed| Some(self.slot(armed.side).checked()?.axis().end));
+        armed.or(self.playing.map(|p| p.position)).unwrap_or(self.position)
+    }
+
+    fn refuse_in_fault(&self) -> Result<(), Reject> {
+        if self.fault.is_some() { Err(Reject::Fault) } else { Ok(()) }
+    }
+
+    fn answer(&mut self, message: DriveMessage) {
+        if self.answers.is_full() {
+            self.answers.pop_front();
+        }
+        // There is room now.
+        let _ = self.answers.push_back(message);
+    }
+
+    fn clear_unused(&mut self) {
+        for side in [Side::A, Side::B] {
+            if !self.is_used(side) {
+                self.slot_mut(side).clear();
+            }
+        }
+    }
+
+    fn is_used(&self, side: Side) -> bool {
+        self.playing.is_some_and(|p| p.side == side) || self.armed.is_some_and(|armed| armed.side == side)
+    }
+
+    fn side_of(&self, table: u32) -> Option<Side> {
+        [Side::A, Side::B].into_iter().find(|side| self.slot(*side).number() == Some(table))
+    }
+
+    fn slot(&self, side: Side) -> &Slot<'a> {
+        match side {
+            Side::A => &self.a,
+            Side::B => &self.b,
+        }
+    }
+
+    fn slot_mut(&mut self, side: Side) -> &mut Slot<'a> {
+        match side {
+            Side::A => &mut self.a,
+            Side::B => &mut self.b,
+        }
+    }
+}
+
+/// No limit of `table` is above `drive`'s.
+fn is_within(table: &Limits, drive: &Limits) -> bool {
+    let jerk = match (table.jerk, drive.jerk) {
+        (_, None) => true,
+        (Some(t), Some(d)) => t <= d,
+        (None, Some(_)) => false,
+    };
+    table.velocity <= drive.velocity && table.acceleration <= drive.acceleration && jerk
+}
+
+#[cfg(test)]
+mod tests;

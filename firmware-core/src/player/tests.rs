@@ -1,0 +1,112 @@
+use super::*;
+use protocol::message::{Part, part_crc};
+use protocol::table::control::ControlWriter;
+use protocol::table::geometry::{self, GeometrySpan};
+use protocol::table::span::SpanWriter;
+use protocol::table::{AxisHeader, FORMAT_VERSION, Stream, TableError};
+
+extern crate std;
+use std::vec::Vec;
+
+const LIMITS: Limits = Limits { velocity: 1e6, acceleration: 1e8, jerk: Some(1e10) };
+
+fn config() -> AxisConfig {
+    AxisConfig { axis: 0, tick_ns: 1_000_000, position: 100, limits: LIMITS, status_ticks: 0 }
+}
+
+/// A straight move of 8 u in one geometry span and five q spans, from 100 to 8100 counts.
+fn bring(player: &mut Player<'_>, table: u32) {
+    let (mut shared, mut spans, mut writer) = (Vec::new(), Vec::new(), SpanWriter::default());
+    geometry::write(&mut shared, GeometrySpan { length: 2048, spans: 5 });
+    writer.push(&mut spans, Some(200), None);
+    for (step, code) in [(500, 3000), (648, 5000), (500, 3000)] {
+        writer.push(&mut spans, Some(step), Some(code));
+    }
+    writer.push(&mut spans, None, None);
+    let (mut controls, mut points) = (Vec::new(), ControlWriter::default());
+    [0, 8000, 16_000, 24_000].into_iter().for_each(|p| points.push(&mut controls, p / 3 + 100));
+    let header = TableHeader {
+        version: FORMAT_VERSION,
+        table,
+        spans: 5,
+        geometry_spans: 1,
+        step_exponent: -8,
+        q_scale: 1e-5,
+        tick_ns: 1_000_000,
+        geometry_bytes: shared.len() as u32,
+        span_bytes: spans.len() as u32,
+    };
+    shared.extend(spans);
+    let control_bytes = controls.len() as u32;
+    let axis =
+        AxisHeader { table, axis: 0, fraction_bits: 0, start: 100, end: 8100, limits: LIMITS, control_bytes };
+    player.handle(&HostMessage::Open(header));
+    player.handle(&HostMessage::OpenAxis(axis));
+    for (part, bytes, crc) in [
+        (Part::Shared, &shared, part_crc(&header, &[&shared]).unwrap()),
+        (Part::Axis, &controls, part_crc(&axis, &[&controls]).unwrap()),
+    ] {
+        player.handle(&HostMessage::Data { table, part, offset: 0, bytes });
+        player.handle(&HostMessage::Seal { table, part, crc });
+    }
+}
+
+#[test]
+fn a_move_runs_through_all_states_to_its_end() {
+    let (mut a, mut b) = ([0; 64], [0; 64]);
+    let mut player = Player::new(config(), &mut a, &mut b);
+    assert_eq!(player.status().state, State::Idle);
+    bring(&mut player, 4);
+    let Some(DriveMessage::Ready { table: 4, ticks, .. }) = player.poll_answer() else { panic!() };
+    assert_eq!(player.status().state, State::Ready);
+    player.handle(&HostMessage::Start { table: 4, tick: 2 });
+    assert_eq!((player.status().state, player.status().fill), (State::Armed, ticks + 2));
+    let mut last = 100;
+    for tick in 0..ticks + 2 {
+        let setpoint = player.tick();
+        assert!(setpoint.position >= last && setpoint.velocity >= 0.0);
+        assert_eq!(player.status().state, if tick < 2 { State::Armed } else { State::Running });
+        last = setpoint.position;
+    }
+    assert_eq!(player.tick(), Setpoint::at_rest(8100));
+    assert_eq!((player.status().state, player.status().fill), (State::Holding, 0));
+    assert_eq!(player.poll_answer(), None);
+}
+
+#[test]
+fn memory_that_changes_under_a_running_table_is_a_fault_that_stays() {
+    let (mut a, mut b) = ([0; 64], [0; 64]);
+    let mut player = Player::new(config(), &mut a, &mut b);
+    bring(&mut player, 4);
+    player.handle(&HostMessage::Start { table: 4, tick: 0 });
+    let moving = (0..100).map(|_| player.tick()).last().unwrap();
+    assert!(moving.position > 100);
+    player.a.corrupt();
+    let stopped = (0..100_000).map(|_| player.tick()).find(|setpoint| setpoint.done).unwrap();
+    assert!(stopped.position < 8100);
+    let status = player.status();
+    let error = TableError::Truncated { stream: Stream::Spans, index: 3 };
+    assert_eq!((status.state, status.fault), (State::Fault, Some(Fault::Table { table: 4, error })));
+    let _ready = player.poll_answer();
+    bring(&mut player, 5);
+    player.handle(&HostMessage::Start { table: 5, tick: 1 << 40 });
+    while let Some(answer) = player.poll_answer() {
+        assert_eq!(answer, DriveMessage::Reject { table: 5, reason: Reject::Fault });
+    }
+    assert_eq!(player.tick(), stopped);
+    assert_eq!(player.status().fault, status.fault);
+}
+
+#[test]
+fn answers_that_nobody_fetches_keep_the_newest() {
+    let (mut a, mut b) = ([0; 64], [0; 64]);
+    let mut player = Player::new(AxisConfig { status_ticks: 1, ..config() }, &mut a, &mut b);
+    (0..100).for_each(|_| {
+        player.tick();
+    });
+    (0..20).for_each(|table| player.handle(&HostMessage::Start { table, tick: 0 }));
+    let answers: Vec<_> = core::iter::from_fn(|| player.poll_answer()).collect();
+    assert_eq!(answers.len(), 8);
+    let newest = DriveMessage::Reject { table: 19, reason: Reject::NotReady };
+    assert_eq!(answers.last(), Some(&newest));
+}

@@ -1,0 +1,183 @@
+//! Memory for one table, filled in order and checked when it is complete.
+
+use protocol::message::{Part, Reject, part_crc};
+use protocol::table::{AxisHeader, TableHeader};
+
+use crate::table::{CheckedTable, TableView};
+
+/// A buffer and what is known of the table in it.
+#[derive(Debug)]
+pub(crate) struct Slot<'a> {
+    memory: &'a mut [u8],
+    table: Option<Table>,
+}
+
+/// A table that is coming in, or has come.
+#[derive(Clone, Copy, Debug)]
+struct Table {
+    header: TableHeader,
+    axis: Option<AxisHeader>,
+    shared: Progress,
+    controls: Progress,
+    /// Duration [2^-32 s] once the table was checked.
+    checked: Option<u64>,
+}
+
+/// How far a part has come.
+#[derive(Clone, Copy, Debug, Default)]
+struct Progress {
+    received: u32,
+    /// Its checksum, once sealed.
+    seal: Option<u32>,
+}
+
+impl<'a> Slot<'a> {
+    pub(crate) fn new(memory: &'a mut [u8]) -> Self {
+        Self { memory, table: None }
+    }
+
+    /// Number of the table in it.
+    pub(crate) fn number(&self) -> Option<u32> {
+        self.table.map(|t| t.header.table)
+    }
+
+    /// The table was checked and may be played.
+    pub(crate) fn is_ready(&self) -> bool {
+        self.table.is_some_and(|t| t.checked.is_some())
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.table = None;
+    }
+
+    pub(crate) fn open(&mut self, header: TableHeader) -> Result<(), Reject> {
+        header.check().map_err(Reject::Table)?;
+        self.fits(header.shared_bytes())?;
+        let (shared, controls) = (Progress::default(), Progress::default());
+        self.table = Some(Table { header, axis: None, shared, controls, checked: None });
+        Ok(())
+    }
+
+    pub(crate) fn open_axis(&mut self, axis: AxisHeader) -> Result<(), Reject> {
+        let table = self.table.ok_or(Reject::NotOpen)?;
+        axis.check().map_err(Reject::Table)?;
+        self.fits(table.header.shared_bytes() + u64::from(axis.control_bytes))?;
+        self.table = Some(Table { axis: Some(axis), controls: Progress::default(), checked: None, ..table });
+        Ok(())
+    }
+
+    fn fits(&self, needed: u64) -> Result<(), Reject> {
+        let available = self.memory.len() as u64;
+        if needed > available { Err(Reject::NoRoom { needed, available }) } else { Ok(()) }
+    }
+
+    /// Takes bytes that continue what came before; earlier ones came twice and are ignored, later ones leave a
+    /// gap that the seal reports.
+    pub(crate) fn data(&mut self, part: Part, offset: u32, bytes: &[u8]) -> Result<(), Reject> {
+        let Some(table) = &mut self.table else { return Err(Reject::NotOpen) };
+        let (from, length) = table.place(part).ok_or(Reject::NotOpen)?;
+        let progress = table.progress(part);
+        if progress.seal.is_some() || offset != progress.received {
+            return Ok(());
+        }
+        let after = offset as usize + bytes.len();
+        if after > length {
+            return Err(Reject::Incomplete { part, received: offset });
+        }
+        let target = self.memory.get_mut(from + offset as usize..from + after);
+        target.ok_or(Reject::NotOpen)?.copy_from_slice(bytes);
+        progress.received = after as u32;
+        Ok(())
+    }
+
+    /// Ends a part; `Ok(true)` when the table has become complete.
+    pub(crate) fn seal(&mut self, part: Part, crc: u32) -> Result<bool, Reject> {
+        let Some(table) = &mut self.table else { return Err(Reject::NotOpen) };
+        let (from, length) = table.place(part).ok_or(Reject::NotOpen)?;
+        let progress = *table.progress(part);
+        if progress.seal == Some(crc) {
+            return Ok(table.is_complete());
+        }
+        if (progress.received as usize) < length {
+            return Err(Reject::Incomplete { part, received: progress.received });
+        }
+        let bytes = self.memory.get(from..from + length).ok_or(Reject::NotOpen)?;
+        let found = match (part, table.axis) {
+            (Part::Shared, _) => part_crc(&table.header, &[bytes]),
+            (Part::Axis, Some(axis)) => part_crc(&axis, &[bytes]),
+            (Part::Axis, None) => return Err(Reject::NotOpen),
+        };
+        if found != Ok(crc) {
+            *table.progress(part) = Progress::default();
+            return Err(Reject::Checksum(part));
+        }
+        table.progress(part).seal = Some(crc);
+        Ok(table.is_complete())
+    }
+
+    /// Checks a complete table.
+    pub(crate) fn check(&mut self) -> Result<CheckedTable<'_>, Reject> {
+        let duration = self.view().ok_or(Reject::NotOpen)?.check().map_err(Reject::Table)?.duration();
+        if let Some(table) = &mut self.table {
+            table.checked = Some(duration);
+        }
+        self.checked().ok_or(Reject::NotReady)
+    }
+
+    /// The table, if it was checked.
+    pub(crate) fn checked(&self) -> Option<CheckedTable<'_>> {
+        let duration = self.table?.checked?;
+        Some(CheckedTable::known(self.view()?, duration))
+    }
+
+    /// Both headers of a table that is coming in.
+    pub(crate) fn headers(&self) -> Option<(TableHeader, AxisHeader)> {
+        let table = self.table?;
+        Some((table.header, table.axis?))
+    }
+
+    /// Checksums of both parts, once sealed.
+    pub(crate) fn seals(&self) -> Option<[u32; 2]> {
+        let table = self.table?;
+        Some([table.shared.seal?, table.controls.seal?])
+    }
+
+    fn view(&self) -> Option<TableView<'_>> {
+        let table = self.table?;
+        let shared = table.header.shared_bytes() as usize;
+        let axis = table.axis?;
+        let (shared, rest) = self.memory.split_at_checked(shared)?;
+        let controls = rest.get(..axis.control_bytes as usize)?;
+        TableView::new(table.header, axis, shared, controls).ok()
+    }
+}
+
+impl Table {
+    fn progress(&mut self, part: Part) -> &mut Progress {
+        match part {
+            Part::Shared => &mut self.shared,
+            Part::Axis => &mut self.controls,
+        }
+    }
+
+    /// Where a part begins in memory and how long it is; `None` for an axis part that was not opened.
+    fn place(&self, part: Part) -> Option<(usize, usize)> {
+        let shared = self.header.shared_bytes() as usize;
+        match part {
+            Part::Shared => Some((0, shared)),
+            Part::Axis => Some((shared, self.axis?.control_bytes as usize)),
+        }
+    }
+
+    fn is_complete(&self) -> bool {
+        self.shared.seal.is_some() && self.controls.seal.is_some()
+    }
+}
+
+#[cfg(test)]
+impl Slot<'_> {
+    /// Overwrites the table's bytes, as a memory error would.
+    pub(crate) fn corrupt(&mut self) {
+        self.memory.fill(0xff);
+    }
+}

@@ -1,0 +1,46 @@
+//! A simulated drive on the bus: the shipped core, unchanged.
+
+use firmware_core::drive::{Drive, DriveConfig};
+use protocol::message::Status;
+
+use crate::axis_loop::CountSetpoint;
+use crate::bus::{Bus, Nanoseconds, NodeIndex};
+
+/// Two table buffers of a drive.
+pub type Buffers = [Vec<u8>; 2];
+
+/// One drive, attached to a bus.
+#[derive(Debug)]
+pub struct DriveNode<'m> {
+    drive: Drive<'m>,
+    node: NodeIndex,
+}
+
+impl<'m> DriveNode<'m> {
+    /// A drive at rest with its two table buffers.
+    pub fn new(config: DriveConfig, buffers: &'m mut Buffers, bus: &mut dyn Bus) -> Self {
+        let [a, b] = buffers;
+        Self { drive: Drive::new(config, a, b), node: bus.attach() }
+    }
+
+    /// One control tick at `now`: takes what has come, gives the set-point, sends what there is to say.
+    ///
+    /// The second value is whether the drive stands still.
+    pub fn tick(&mut self, bus: &mut dyn Bus, now: Nanoseconds) -> (CountSetpoint, bool) {
+        while let Some(received) = bus.receive(self.node) {
+            self.drive.receive(&received.frame);
+        }
+        let s = self.drive.tick();
+        while let Some(frame) = self.drive.poll_transmit() {
+            bus.send(self.node, frame, now);
+        }
+        let setpoint =
+            CountSetpoint { position: s.position, velocity: s.velocity, acceleration: s.acceleration };
+        (setpoint, s.done)
+    }
+
+    /// How the drive is.
+    pub fn status(&self) -> Status {
+        self.drive.status()
+    }
+}

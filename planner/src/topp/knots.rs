@@ -1,0 +1,293 @@
+//! Where the q knots go: at every geometry knot, dense in time where the speed changes, graded away from rests.
+
+use super::error::PlanError;
+use super::layout::{Layout, Pieces};
+use super::problem::{Problem, Settings};
+use super::sweep::Sweep;
+use crate::feed::table::MIN_SPANS;
+use crate::geometry::grid_path::GridPath;
+
+/// Spans next to each other grow by at most this away from a rest.
+const GROWTH: f64 = 1.8;
+/// Longest span planned for [s]; a table span must stay below one second.
+const LONGEST_S: f64 = 0.4;
+/// Fewest spans of a short move, and of one too short to build up full acceleration: only with so many is its loss
+/// below one per cent.
+const FEWEST_SPANS: f64 = 32.0;
+const FEWEST_ALL_JERK: f64 = 64.0;
+/// Longest step of a table [grid steps].
+const LONGEST_STEP: f64 = (1u64 << 31) as f64;
+/// Inner spans next to a rest, and the cells each of them gets.
+const REST_SPANS: usize = 4;
+const REST_CELLS: u8 = 4;
+
+/// Places the knots of a valid problem by the speed the sweep allows.
+pub(super) fn place(problem: &Problem, settings: &Settings, sweep: &Sweep) -> Result<Layout, PlanError> {
+    let path = problem.path;
+    let total = path.grid_length();
+    if total < MIN_SPANS as u64 {
+        return Err(PlanError::TooShort { steps: total, needed: MIN_SPANS as u64 });
+    }
+    let estimate = Estimate::new(problem, settings, sweep);
+    let hard = hard_breaks(problem, &estimate);
+    let mut knots = vec![0];
+    for (pair, index) in hard.windows(2).zip(0..) {
+        let (a, b) = (pair[0], pair[1]);
+        let rest = index == 0 || index + 2 == hard.len();
+        let pieces = if rest { 1 } else { estimate.pieces(a, b, problem.shortest_span_s) };
+        estimate.divide(a, b, pieces, &mut knots);
+    }
+    while knots.len() <= MIN_SPANS {
+        bisect_longest_inner(&mut knots);
+    }
+    let mut layout = Layout::new(path, knots);
+    let slow = 0.5 * estimate.ramp_s;
+    for i in 1..layout.spans() - 1 {
+        let time = estimate.time(layout.knots[i], layout.knots[i + 1]);
+        layout.cells[i] = if time > slow { 2 } else { 1 };
+    }
+    grade_cells(&mut layout);
+    Ok(layout)
+}
+
+/// Divides each span `i` into `parts[i]` parts of about equal length; false where the grid is too coarse for that.
+pub(super) fn refine(path: &GridPath, layout: &Layout, parts: &[u32]) -> Result<Layout, usize> {
+    let mut knots = vec![0];
+    let mut cells = Vec::with_capacity(layout.spans());
+    for i in 0..layout.spans() {
+        let (a, b) = (layout.knots[i], layout.knots[i + 1]);
+        let k = u64::from(parts[i].max(1));
+        if b - a < k {
+            return Err(i);
+        }
+        for j in 1..=k {
+            knots.push(a + ((b - a) as u128 * u128::from(j) / u128::from(k)) as u64);
+            cells.push(layout.cells[i]);
+        }
+    }
+    let mut refined = Layout::new(path, knots);
+    refined.cells = cells;
+    grade_cells(&mut refined);
+    Ok(refined)
+}
+
+fn grade_cells(layout: &mut Layout) {
+    let n = layout.spans();
+    for k in 1..=REST_SPANS.min(n - 2) {
+        layout.cells[k] = REST_CELLS;
+        layout.cells[n - 1 - k] = REST_CELLS;
+    }
+}
+
+/// Geometry knots, the ends of both rest spans, and the places where the caps change.
+fn hard_breaks(problem: &Problem, estimate: &Estimate) -> Vec<u64> {
+    let path = problem.path;
+    let total = path.grid_length();
+    let breaks = &path.breaks;
+    let snap = |wanted: f64, geometry: u64| {
+        let most = (total / 12).clamp(1, geometry);
+        let steps = (wanted / path.step).clamp(1.0, most as f64) as u64;
+        // No sliver between the rest span and the next geometry knot.
+        if steps < geometry && geometry - steps < steps / 2 { (geometry / 2).max(1) } else { steps }
+    };
+    let first = snap(estimate.rest[0], breaks[1]);
+    let last = total - snap(estimate.rest[1], total - breaks[breaks.len() - 2]);
+    let mut hard = Vec::with_capacity(breaks.len() + 2);
+    hard.push(0);
+    hard.push(first.min(total - 2));
+    hard.extend(breaks.iter().copied().filter(|&b| b > first && b < last));
+    for pair in problem.caps.windows(2) {
+        let at = pair[0].until;
+        if pair[0].speed == pair[1].speed || at <= first || at >= last {
+            continue;
+        }
+        let slot = hard.partition_point(|&b| b < at);
+        let near = 0.25 * estimate.length_at(at) / path.step;
+        let below = at - hard[slot - 1];
+        let above = hard.get(slot).copied().unwrap_or(last).abs_diff(at);
+        if below.min(above) as f64 >= near.max(1.0) {
+            hard.insert(slot, at);
+        }
+    }
+    hard.push(last);
+    hard.push(total);
+    hard.dedup();
+    hard
+}
+
+fn bisect_longest_inner(knots: &mut Vec<u64>) {
+    let widest = (0..knots.len() - 1).max_by_key(|&i| knots[i + 1] - knots[i]).unwrap_or(0);
+    let middle = knots[widest] + (knots[widest + 1] - knots[widest]) / 2;
+    knots.insert(widest + 1, middle);
+}
+
+/// Speed expected along the path, as a density of spans.
+#[derive(Debug)]
+struct Estimate<'a> {
+    path: &'a GridPath,
+    stations: &'a [f64],
+    /// Spans from the start of the path to each station.
+    count: Vec<f64>,
+    /// Time from the start of the path to each station [s].
+    clock: Vec<f64>,
+    /// Wanted lengths of the rest spans.
+    rest: [f64; 2],
+    /// Shortest time in which an axis builds up its full acceleration [s].
+    ramp_s: f64,
+}
+
+impl<'a> Estimate<'a> {
+    fn new(problem: &Problem<'a>, settings: &Settings, sweep: &'a Sweep) -> Self {
+        let path = problem.path;
+        let ramp_s = ramp(problem, sweep);
+        let (rest, end_jerk) = rest_lengths(problem, sweep, ramp_s);
+        let u = &sweep.stations;
+        let length = path.length();
+        // Away from rest under constant jerk: q = (6^(4/3)/4) (J/|p'|)^(2/3) u^(4/3).
+        let from_rest = |d: f64, jerk: f64| {
+            if jerk.is_finite() { 6f64.powf(4.0 / 3.0) / 4.0 * (jerk * d * d).powf(2.0 / 3.0) } else { f64::INFINITY }
+        };
+        let speed: Vec<f64> = u
+            .iter()
+            .zip(&sweep.constant)
+            .zip(&sweep.q)
+            .map(|((&u, &constant), &q)| {
+                let left = from_rest(u.max(rest[0]), end_jerk[0]);
+                let right = from_rest((length - u).max(rest[1]), end_jerk[1]);
+                let q = if q > 0.0 { q.min(constant) } else { constant };
+                q.min(left).min(right).sqrt()
+            })
+            .collect();
+        let mut clock = vec![0.0];
+        for k in 1..u.len() {
+            clock.push(clock[k - 1] + 2.0 * (u[k] - u[k - 1]) / (speed[k] + speed[k - 1]));
+        }
+        let total = clock[clock.len() - 1];
+        let fewest = if total < 4.0 * ramp_s { FEWEST_ALL_JERK } else { FEWEST_SPANS };
+        let target = (ramp_s / settings.spans_per_ramp).min(total / fewest);
+        let idle = idle_time(&clock, &speed, u, problem, sweep);
+        let allowed = |k: usize| (target + 0.4 * (idle[k] - 1.5 * ramp_s).max(0.0)).min(LONGEST_S);
+        let graded = GROWTH.ln() / (GROWTH - 1.0);
+        let mut count = vec![0.0];
+        for k in 1..u.len() {
+            let wanted = allowed(k).min(allowed(k - 1)) * 0.5 * (speed[k] + speed[k - 1]);
+            let from_start = rest[0] + (GROWTH - 1.0) * u[k];
+            let from_end = rest[1] + (GROWTH - 1.0) * (length - u[k - 1]);
+            let h = wanted.min(graded * from_start.min(from_end)).min(LONGEST_STEP * path.step);
+            count.push(count[k - 1] + (u[k] - u[k - 1]) / h);
+        }
+        Estimate { path, stations: u, count, clock, rest, ramp_s }
+    }
+
+    /// Value at grid step `at` of a quantity given at the stations.
+    fn at(&self, values: &[f64], at: u64) -> f64 {
+        let u = at as f64 * self.path.step;
+        let k = self.stations.partition_point(|&s| s <= u).clamp(1, self.stations.len() - 1);
+        let (a, b) = (self.stations[k - 1], self.stations[k]);
+        values[k - 1] + (values[k] - values[k - 1]) * ((u - a) / (b - a)).clamp(0.0, 1.0)
+    }
+
+    fn time(&self, a: u64, b: u64) -> f64 {
+        self.at(&self.clock, b) - self.at(&self.clock, a)
+    }
+
+    /// Expected span length round grid step `at`, in u.
+    fn length_at(&self, at: u64) -> f64 {
+        let u = at as f64 * self.path.step;
+        let k = self.stations.partition_point(|&s| s <= u).clamp(1, self.stations.len() - 1);
+        (self.stations[k] - self.stations[k - 1]) / (self.count[k] - self.count[k - 1])
+    }
+
+    fn pieces(&self, a: u64, b: u64, shortest_s: f64) -> u64 {
+        let wanted = (self.at(&self.count, b) - self.at(&self.count, a) - 1e-6).ceil().max(1.0);
+        let most = if shortest_s > 0.0 { self.time(a, b) / (1.3 * shortest_s) } else { f64::INFINITY };
+        (wanted.min(most.max(1.0)) as u64).clamp(1, b - a)
+    }
+
+    /// Appends the knots after `a` up to `b`, `pieces` of them, at equal shares of the count.
+    fn divide(&self, a: u64, b: u64, pieces: u64, knots: &mut Vec<u64>) {
+        let (from, to) = (self.at(&self.count, a), self.at(&self.count, b));
+        for j in 1..pieces {
+            let wanted = from + (to - from) * j as f64 / pieces as f64;
+            let k = self.count.partition_point(|&c| c <= wanted).clamp(1, self.count.len() - 1);
+            let t = (wanted - self.count[k - 1]) / (self.count[k] - self.count[k - 1]);
+            let u = self.stations[k - 1] + (self.stations[k] - self.stations[k - 1]) * t.clamp(0.0, 1.0);
+            let low = knots[knots.len() - 1] + 1;
+            knots.push(((u / self.path.step).round() as u64).clamp(low, b - (pieces - j)));
+        }
+        knots.push(b);
+    }
+}
+
+/// Shortest time in which a moving axis builds up its acceleration; without jerk limits, a share of its speed ramp.
+fn ramp(problem: &Problem, sweep: &Sweep) -> f64 {
+    const SPEED_RAMP_SHARE: f64 = 0.1;
+    let moving = problem.path.axes.iter().map(|a| a.controls.windows(2).any(|w| w[0] != w[1]));
+    let ramp = problem
+        .limits
+        .iter()
+        .zip(moving)
+        .filter(|(_, moving)| *moving)
+        .map(|(l, _)| {
+            if l.jerk.is_finite() { l.acceleration / l.jerk } else { SPEED_RAMP_SHARE * l.velocity / l.acceleration }
+        })
+        .fold(f64::INFINITY, f64::min);
+    let swept = sweep.duration();
+    if ramp.is_finite() { ramp.max(problem.shortest_span_s).max(1e-6 * swept) } else { 0.1 * swept }
+}
+
+/// Wanted lengths of both rest spans, and J/|p'| at both ends.
+fn rest_lengths(problem: &Problem, sweep: &Sweep, ramp_s: f64) -> ([f64; 2], [f64; 2]) {
+    let path = problem.path;
+    let mut pieces = Pieces::new(path);
+    let mut ends = [(0.0, 0.0); 2];
+    let last = path.spans() - 1;
+    for (end, (g, far)) in ends.iter_mut().zip([(0, false), (last, true)]) {
+        let (mut length, mut jerk) = (path.length() / 12.0, f64::INFINITY);
+        for (piece, l) in pieces.at(g).iter().zip(problem.limits) {
+            let slope = piece.first(if far { piece.length } else { 0.0 }).abs();
+            if slope == 0.0 {
+                continue;
+            }
+            // Acceleration saturates exactly at the joint: A^3/(6 J^2 |p'|) = A T^2/(6 |p'|) with T = A/J; without
+            // a jerk limit T is two ticks, or a small share of the ramp.
+            let t = if l.jerk.is_finite() { l.acceleration / l.jerk } else { 0.05 * ramp_s };
+            let t = t.max(2.0 * problem.shortest_span_s);
+            length = length.min(l.acceleration * t * t / (6.0 * slope));
+            jerk = jerk.min(l.jerk / slope);
+        }
+        let q = sweep.constant[if far { sweep.constant.len() - 1 } else { 0 }];
+        *end = (length.min(0.5 * LONGEST_S * q.sqrt()), jerk);
+    }
+    ([ends[0].0, ends[1].0], [ends[0].1, ends[1].1])
+}
+
+/// Time from each station to the nearest place where the motion is not plain steady travel on a straight line [s].
+fn idle_time(clock: &[f64], speed: &[f64], u: &[f64], problem: &Problem, sweep: &Sweep) -> Vec<f64> {
+    const STEADY: f64 = 0.02;
+    let path = problem.path;
+    let n = u.len();
+    let per_span = (n - 1) / path.spans();
+    let mut pieces = Pieces::new(path);
+    let mut idle: Vec<f64> = (0..n)
+        .map(|k| {
+            let g = (k / per_span).min(path.spans() - 1);
+            let x = u[k] - path.breaks[g] as f64 * path.step;
+            let q = speed[k] * speed[k];
+            let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+            let w = 0.5 * (sweep.q[b] - sweep.q[a]).abs() / (u[b] - u[a]);
+            let steady = pieces.at(g).iter().zip(problem.limits).all(|(p, l)| {
+                let bend = p.second(x).abs().max(p.second(0.0).abs()) * q;
+                bend <= STEADY * l.acceleration && p.first(x).abs() * w <= STEADY * l.acceleration
+            });
+            if steady && k > 0 && k + 1 < n { f64::INFINITY } else { 0.0 }
+        })
+        .collect();
+    for k in 1..n {
+        idle[k] = idle[k].min(idle[k - 1] + clock[k] - clock[k - 1]);
+    }
+    for k in (0..n - 1).rev() {
+        idle[k] = idle[k].min(idle[k + 1] + clock[k + 1] - clock[k]);
+    }
+    idle
+}

@@ -1,0 +1,81 @@
+//! Rounding the control values to the table's codes, and what it may change.
+
+use super::layout::Layout;
+use super::rows::RowSource;
+use super::sweep::Sweep;
+use crate::feed::table::FeedTable;
+
+/// Largest code of a table.
+const LARGEST_CODE: f64 = 65535.0;
+/// Relative error of a value computed by the drive in f32: the square's conversion and one product.
+const SINGLE: f64 = 1.3e-7;
+
+/// Size of a squared code such that control values up to `ceiling` V^2 have a code.
+pub(super) fn scale(unit: f64, ceiling: f64) -> f32 {
+    let exact = unit * ceiling / (LARGEST_CODE * LARGEST_CODE);
+    let single = exact as f32;
+    if f64::from(single) < exact { single.next_up() } else { single }
+}
+
+/// Bounds on the change of each control value of x by rounding.
+///
+/// c = k^2 s changes by at most sqrt(c s) + s/4 when k is rounded to the nearest integer, and by twice that and a
+/// little when it is rounded down, as at the ends. The swept q bounds c from above well enough here: the rounded
+/// values are checked afterwards.
+pub(super) fn halves(rows: &RowSource, scale: f32, sweep: &Sweep) -> Vec<f64> {
+    const HEADROOM: f64 = 1.1;
+    let s = f64::from(scale) / rows.unit;
+    let layout = rows.layout;
+    let m = layout.unknowns();
+    let mut hint = 0;
+    let path = rows.problem.path;
+    let swept: Vec<f64> = (0..layout.spans())
+        .map(|i| sweep.largest(layout.start(path, i), layout.start(path, i + 1), &mut hint) / rows.unit)
+        .collect();
+    let fold = rows.fold();
+    (0..m)
+        .map(|j| {
+            let i = j + 1;
+            let bound = swept[i - 1].max(swept[i]).max(swept[i + 1]);
+            let c = (HEADROOM * bound).min(rows.ceiling);
+            if j == 0 {
+                fold[0] * (2.0 * (rows.joint[0] * s).sqrt() + s + SINGLE * rows.joint[0])
+            } else if j + 1 == m {
+                fold[1] * (2.0 * (rows.joint[1] * s).sqrt() + s + SINGLE * rows.joint[1])
+            } else {
+                (c * s).sqrt() + 0.25 * s + SINGLE * c
+            }
+        })
+        .collect()
+}
+
+/// The table of the control values `x`.
+pub(super) fn table(rows: &RowSource, scale: f32, x: &[f64]) -> FeedTable {
+    let m = x.len();
+    let fold = rows.fold();
+    let s = f64::from(scale);
+    let root = |x: f64| (x * rows.unit / s).sqrt();
+    let code = |k: f64| k.clamp(1.0, LARGEST_CODE) as u16;
+    let codes = (0..m)
+        .map(|j| {
+            if j == 0 {
+                code((root(x[0] / fold[0])).floor())
+            } else if j + 1 == m {
+                code((root(x[j] / fold[1])).floor())
+            } else {
+                code(root(x[j]).round())
+            }
+        })
+        .collect();
+    FeedTable { path: rows.problem.path.clone(), steps: steps(rows.layout), q_scale: scale, codes }
+}
+
+/// Steps of the layout; knots are placed less than 2^32 apart.
+fn steps(layout: &Layout) -> Vec<u32> {
+    layout.knots.windows(2).map(|k| u32::try_from(k[1] - k[0]).unwrap_or(u32::MAX)).collect()
+}
+
+/// The control values of x that the table stands for.
+pub(super) fn values(rows: &RowSource, table: &FeedTable) -> Vec<f64> {
+    (0..rows.layout.unknowns()).map(|j| table.control(j + 1) / rows.unit).collect()
+}

@@ -1,0 +1,146 @@
+//! A strictly feasible start: slow, smooth, and as fast as cheap bounds allow.
+//!
+//! Scaling x by sigma scales velocity and acceleration rows by sigma, jerk rows by sigma^1.5, and leaves the rest
+//! conditions alone: between rests a feasible start always exists.
+
+use super::layout::{Derivatives, Pieces};
+use super::rows::RowSource;
+use crate::job::machine::MAX_AXES;
+
+/// Share of the acceleration limit the start's slope may use.
+const SLOPE_SHARE: f64 = 0.1;
+/// Share of the jerk limit its smoothing aims at.
+const JERK_SHARE: f64 = 0.6;
+/// Share of the bound at the joints with rest spans.
+const JOINT_SHARE: f64 = 0.25;
+/// Scale of the first attempt.
+const SCALE: f64 = 0.7;
+
+/// Control values of x, one per inner span; feasible as they are or after scaling down.
+pub(super) fn profile(rows: &RowSource) -> Vec<f64> {
+    let layout = rows.layout;
+    let m = layout.unknowns();
+    let h = &layout.h;
+    let mut pieces = Pieces::new(rows.problem.path);
+    let (mut x, slope): (Vec<f64>, Vec<f64>) = (0..m).map(|s| constant(rows, s, &mut pieces)).unzip();
+    let middles = middles(h);
+    erode(&mut x, &middles, smoothing_width(rows));
+    for s in 1..m {
+        let rise = slope[s].min(slope[s - 1]) * (middles[s] - middles[s - 1]);
+        x[s] = x[s].min(x[s - 1] + rise);
+    }
+    for s in (1..m).rev() {
+        let rise = slope[s].min(slope[s - 1]) * (middles[s] - middles[s - 1]);
+        x[s - 1] = x[s - 1].min(x[s] + rise);
+    }
+    for _ in 0..2 {
+        smooth(&mut x, h, &middles, 0.5 * smoothing_width(rows));
+    }
+    let length = middles[m - 1] + 0.5 * h[m] + h[m + 1];
+    for (s, x) in x.iter_mut().enumerate() {
+        let launch = JOINT_SHARE * rows.joint[0] * (middles[s] / h[0]).powf(4.0 / 3.0);
+        let landing = JOINT_SHARE * rows.joint[1] * ((length - middles[s]) / h[m + 1]).powf(4.0 / 3.0);
+        *x = SCALE / (1.0 / *x + 1.0 / launch + 1.0 / landing);
+    }
+    x
+}
+
+/// Middles of the inner spans in u: where their control values sit.
+fn middles(h: &[f64]) -> Vec<f64> {
+    let mut u = h[0];
+    h[1..h.len() - 1]
+        .iter()
+        .map(|h| {
+            u += h;
+            u - 0.5 * h
+        })
+        .collect()
+}
+
+/// Largest constant x over inner span `s`, and the slope of x it may have there.
+fn constant(rows: &RowSource, s: usize, pieces: &mut Pieces) -> (f64, f64) {
+    let (layout, problem) = (rows.layout, rows.problem);
+    let i = s + 1;
+    let g = layout.geometry[i] as usize;
+    let offset = (layout.knots[i] - problem.path.breaks[g]) as f64 * problem.path.step;
+    let (mut q, mut slope) = (rows.ceiling * rows.unit, f64::INFINITY);
+    let mut d = [Derivatives::default(); MAX_AXES];
+    for ((d, piece), l) in d.iter_mut().zip(pieces.at(g)).zip(problem.limits) {
+        *d = Derivatives::of(piece, offset, layout.h[i]);
+        if d.still() {
+            continue;
+        }
+        let first = d.first_max();
+        let second = d.second[0].abs().max(d.second[1].abs());
+        q = q.min((l.velocity / first).powi(2)).min(l.acceleration / second);
+        q = q.min((l.jerk / d.third.abs()).powf(2.0 / 3.0));
+        slope = slope.min(SLOPE_SHARE * l.acceleration / first);
+    }
+    let caps = rows.caps(s);
+    q = q.min(caps.rate * caps.rate);
+    for (mask, speed) in caps.tangential.iter().flatten() {
+        let square: f64 =
+            d.iter().enumerate().filter(|(a, _)| mask >> a & 1 == 1).map(|(_, d)| d.first_max().powi(2)).sum();
+        q = q.min(speed * speed / square);
+    }
+    if problem.shortest_span_s > 0.0 {
+        q = q.min((layout.h[i] / problem.shortest_span_s).powi(2));
+    }
+    (q / rows.unit, slope / rows.unit)
+}
+
+/// Length over which the start is rounded, so that its jerk stays a share of the limit.
+fn smoothing_width(rows: &RowSource) -> f64 {
+    let ramp = rows
+        .problem
+        .limits
+        .iter()
+        .filter(|l| l.jerk.is_finite())
+        .map(|l| l.acceleration / l.jerk)
+        .fold(0.0, f64::max);
+    2.0 * SLOPE_SHARE / JERK_SHARE * ramp * rows.unit.sqrt()
+}
+
+/// Smallest value within `width` on both sides, by a queue of candidates.
+fn erode(x: &mut [f64], at: &[f64], width: f64) {
+    let original = x.to_vec();
+    let mut queue = std::collections::VecDeque::new();
+    let mut next = 0;
+    for s in 0..x.len() {
+        while next < x.len() && (next <= s || at[next] <= at[s] + width) {
+            while queue.back().is_some_and(|&b: &usize| original[b] >= original[next]) {
+                queue.pop_back();
+            }
+            queue.push_back(next);
+            next += 1;
+        }
+        while queue.front().is_some_and(|&f| at[f] < at[s] - width) {
+            queue.pop_front();
+        }
+        x[s] = queue.front().map_or(x[s], |&f| original[f]);
+    }
+}
+
+/// Mean over `width` round each control value, the profile held constant beyond its ends.
+fn smooth(x: &mut [f64], h: &[f64], at: &[f64], width: f64) {
+    let m = x.len();
+    // Integral of the piecewise constant profile up to each inner knot.
+    let mut integral = vec![0.0];
+    for s in 0..m {
+        integral.push(integral[s] + x[s] * h[s + 1]);
+    }
+    let start = at[0] - 0.5 * h[1];
+    let mut knots = vec![start];
+    for s in 0..m {
+        knots.push(knots[s] + h[s + 1]);
+    }
+    let original = x.to_vec();
+    let value = |u: f64| {
+        let k = knots.partition_point(|&k| k <= u).clamp(1, m) - 1;
+        integral[k] + (u - knots[k]) * original[k]
+    };
+    for s in 0..m {
+        let w = width.max(h[s + 1]);
+        x[s] = (value(at[s] + 0.5 * w) - value(at[s] - 0.5 * w)) / w;
+    }
+}

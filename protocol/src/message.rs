@@ -1,0 +1,231 @@
+//! What host and drives say to each other: postcard, one message per block.
+//!
+//! The order of the variants is the wire's numbering: new ones go to the end.
+
+use serde::{Deserialize, Serialize};
+
+use crate::bus::MESSAGE_BYTES;
+use crate::table::{AxisHeader, TableError, TableHeader};
+
+/// Most table bytes of one [`HostMessage::Data`]; with all its other fields it then fits a block.
+pub const DATA_BYTES: usize = 312;
+
+/// From the host.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum HostMessage<'a> {
+    /// A table is to come: its shared header, to all drives. Forgets a table that was received before and
+    /// neither plays nor is armed.
+    Open(TableHeader),
+    /// The header of the axis part, to one drive, after [`HostMessage::Open`].
+    OpenAxis(AxisHeader),
+    /// Bytes of the table. They come in order; repeated ones are ignored.
+    Data {
+        /// Which table.
+        table: u32,
+        /// Which part of it.
+        part: Part,
+        /// Where the bytes belong, from the start of the part.
+        offset: u32,
+        /// At most [`DATA_BYTES`].
+        bytes: &'a [u8],
+    },
+    /// The part is complete; the drive checks it. When both parts are sealed it answers
+    /// [`DriveMessage::Ready`] or [`DriveMessage::Reject`].
+    Seal {
+        /// Which table.
+        table: u32,
+        /// Which part of it.
+        part: Part,
+        /// CRC-32C over the part's header, as postcard, and its bytes.
+        crc: u32,
+    },
+    /// The table starts to play at this tick of the drives' common count.
+    Start {
+        /// Which table.
+        table: u32,
+        /// When [ticks].
+        tick: u64,
+    },
+    /// Nothing starts any more: armed and received tables are forgotten. A table that plays goes on to its end,
+    /// which is at rest.
+    Stop,
+}
+
+/// A part of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Part {
+    /// Geometry stream, then span stream.
+    Shared,
+    /// Control stream of one axis.
+    Axis,
+}
+
+/// From a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum DriveMessage {
+    /// The table is complete, checked and may be started.
+    Ready {
+        /// Which table.
+        table: u32,
+        /// How long it plays [ticks], rounded up.
+        ticks: u64,
+        /// Checksums of the shared and the axis part.
+        crc: [u32; 2],
+    },
+    /// A message was refused.
+    Reject {
+        /// Which table.
+        table: u32,
+        /// Why.
+        reason: Reject,
+    },
+    /// How the drive is.
+    Status(Status),
+}
+
+/// How a drive is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Status {
+    /// What it does.
+    pub state: State,
+    /// First cause of the fault, while in [`State::Fault`].
+    pub fault: Option<Fault>,
+    /// The drive's tick count.
+    pub tick: u64,
+    /// Position set-point [counts].
+    pub position: i64,
+    /// How long it can go on with what it holds and may play [ticks].
+    pub fill: u64,
+}
+
+/// What a drive does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum State {
+    /// Stands still; no table.
+    Idle,
+    /// Stands still; a table is coming in.
+    Receiving,
+    /// Stands still; a checked table waits for its start.
+    Ready,
+    /// Stands still until the tick of the start.
+    Armed,
+    /// Plays a table.
+    Running,
+    /// Stands still at the end of a table.
+    Holding,
+    /// Stands still after a fault, until it is built anew.
+    Fault,
+}
+
+/// Why a drive gave up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Fault {
+    /// A checked table was not the same any more when it was played.
+    Table {
+        /// Which table.
+        table: u32,
+        /// What was wrong.
+        error: TableError,
+    },
+}
+
+/// Why a drive refuses a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Reject {
+    /// The bytes are not an admissible table.
+    Table(TableError),
+    /// A part's checksum differs.
+    Checksum(Part),
+    /// Bytes of a part are missing.
+    Incomplete {
+        /// Which part.
+        part: Part,
+        /// How many bytes came without a gap.
+        received: u32,
+    },
+    /// The table does not fit the drive's memory.
+    NoRoom {
+        /// Bytes it needs.
+        needed: u64,
+        /// Bytes there are.
+        available: u64,
+    },
+    /// The table was made for another control tick.
+    Tick {
+        /// The drive's tick [ns].
+        tick_ns: u32,
+    },
+    /// The axis part belongs to another axis.
+    Axis {
+        /// The drive's axis.
+        axis: u8,
+    },
+    /// The table was planned for limits above the drive's.
+    Limits,
+    /// The table does not start where the motion before it ends.
+    Position {
+        /// Where the motion before it ends [counts].
+        position: i64,
+    },
+    /// A table plays or is armed: both buffers are taken, or the number is, or another start is pending.
+    Busy,
+    /// No such table is open.
+    NotOpen,
+    /// The table is not ready to start.
+    NotReady,
+    /// The tick of the start is not in the future.
+    Late {
+        /// The drive's tick count.
+        tick: u64,
+    },
+    /// The tick of the start lies before the end of the table that plays.
+    Overlap {
+        /// First possible tick.
+        tick: u64,
+    },
+    /// The drive is in fault.
+    Fault,
+}
+
+/// Why a message could not be written or read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MessageError {
+    /// The buffer is too small.
+    NoRoom,
+    /// The bytes are no message.
+    Malformed,
+    /// There are bytes behind the message.
+    LeftOver,
+}
+
+/// A buffer that every message fits.
+pub type MessageBuffer = [u8; MESSAGE_BYTES];
+
+/// Writes a message into `buffer`.
+pub fn encode<'b, M: Serialize>(message: &M, buffer: &'b mut [u8]) -> Result<&'b [u8], MessageError> {
+    match postcard::to_slice(message, buffer) {
+        Ok(bytes) => Ok(bytes),
+        Err(_) => Err(MessageError::NoRoom),
+    }
+}
+
+/// Reads a message.
+pub fn decode<'a, M: Deserialize<'a>>(bytes: &'a [u8]) -> Result<M, MessageError> {
+    match postcard::take_from_bytes(bytes) {
+        Ok((message, [])) => Ok(message),
+        Ok(_) => Err(MessageError::LeftOver),
+        Err(_) => Err(MessageError::Malformed),
+    }
+}
+
+/// Checksum of a part: CRC-32C over its header, as postcard, and its streams in order.
+pub fn part_crc<H: Serialize>(header: &H, streams: &[&[u8]]) -> Result<u32, MessageError> {
+    let mut buffer = [0u8; 64];
+    let mut crc = crate::checksum::Crc32::new();
+    crc.update(encode(header, &mut buffer)?);
+    streams.iter().for_each(|bytes| crc.update(bytes));
+    Ok(crc.finish())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,30 @@
+//! The name of everything that goes over the wire: host and drives with different hashes do not talk.
+
+use crate::checksum::Fnv64;
+
+/// All messages and streams in their order on the wire. Whoever changes one of them changes this text.
+pub const SCHEMA: &str = "\
+TableHeader{version u8,table u32,spans u32,geometry_spans u32,step_exponent i8,q_scale f32,tick_ns u32,\
+geometry_bytes u32,span_bytes u32}\
+AxisHeader{table u32,axis u8,fraction_bits u8,start i64,end i64,limits Limits,control_bytes u32}\
+Limits{velocity f32,acceleration f32,jerk ?f32}\
+geometry{length<<1|more,spans-2}span{step,code dd u16}control{point dd i64}\
+Part[Shared,Axis]\
+HostMessage[Open TableHeader,OpenAxis AxisHeader,Data{table u32,part Part,offset u32,bytes [u8]},\
+Seal{table u32,part Part,crc u32},Start{table u32,tick u64},Stop]\
+DriveMessage[Ready{table u32,ticks u64,crc [u32;2]},Reject{table u32,reason Reject},Status]\
+Status{state State,fault ?Fault,tick u64,position i64,fill u64}\
+State[Idle,Receiving,Ready,Armed,Running,Holding,Fault]\
+Fault[Table{table u32,error TableError}]\
+Reject[Table TableError,Checksum Part,Incomplete{part Part,received u32},NoRoom{needed u64,available u64},\
+Tick{tick_ns u32},Axis{axis u8},Limits,Position{position i64},Busy,NotOpen,NotReady,Late{tick u64},\
+Overlap{tick u64},Fault]\
+Stream[Geometry,Spans,Controls]\
+HeaderField[Version,Table,Spans,GeometrySpans,StepExponent,QScale,Tick,Length,FractionBits,Limits]\
+TableError[Header HeaderField,Truncated{stream,index u32},Malformed{stream,index u32},\
+Range{stream,index u32},LeftOver{stream},Overfull{index u32},Count{stream},Bend{index u32},Slow{index u32},\
+Fast{index u32},ControlStep{index u32},Start,End]\
+block{length u16,message,crc32c u32}frame{first 1,last 1,number 6}";
+
+/// FNV-1a hash of [`SCHEMA`].
+pub const HASH: u64 = Fnv64::new().with(SCHEMA.as_bytes()).finish();

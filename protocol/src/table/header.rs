@@ -1,0 +1,120 @@
+//! The two headers of a table.
+
+use serde::{Deserialize, Serialize};
+
+use super::rules;
+use super::{HeaderField, TableError};
+
+/// Version of the table format; drives refuse any other.
+pub const FORMAT_VERSION: u8 = 1;
+
+/// Header of the part that all axes share.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TableHeader {
+    /// [`FORMAT_VERSION`].
+    pub version: u8,
+    /// Sequence number of the table.
+    pub table: u32,
+    /// Number of q spans, at least [`rules::MIN_SPANS`].
+    pub spans: u32,
+    /// Number of geometry spans, at least 1.
+    pub geometry_spans: u32,
+    /// One grid step is 2^e in u.
+    pub step_exponent: i8,
+    /// q = code^2 q_scale [u^2/s^2]; finite and positive.
+    pub q_scale: f32,
+    /// Control tick that the table was made for [ns].
+    pub tick_ns: u32,
+    /// Length of the geometry stream [bytes].
+    pub geometry_bytes: u32,
+    /// Length of the span stream [bytes].
+    pub span_bytes: u32,
+}
+
+/// Header of one axis' part.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AxisHeader {
+    /// Sequence number of the table.
+    pub table: u32,
+    /// Axis, in the machine's order.
+    pub axis: u8,
+    /// Control points are in units of 2^-f counts.
+    pub fraction_bits: u8,
+    /// Position at the start [counts].
+    pub start: i64,
+    /// Position at the end [counts].
+    pub end: i64,
+    /// What the table was planned for.
+    pub limits: Limits,
+    /// Length of the control stream [bytes].
+    pub control_bytes: u32,
+}
+
+/// Limits of one axis in counts, symmetric.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Limits {
+    /// Largest |velocity| [counts/s].
+    pub velocity: f32,
+    /// Largest |acceleration| [counts/s^2].
+    pub acceleration: f32,
+    /// Largest |jerk| [counts/s^3]; `None` when jerk is not limited.
+    pub jerk: Option<f32>,
+}
+
+impl TableHeader {
+    /// Refuses fields that no table has.
+    pub fn check(&self) -> Result<(), TableError> {
+        let refuse = |field| Err(TableError::Header(field));
+        if self.version != FORMAT_VERSION {
+            return refuse(HeaderField::Version);
+        }
+        if self.spans < rules::MIN_SPANS || self.spans < self.geometry_spans {
+            return refuse(HeaderField::Spans);
+        }
+        if self.geometry_spans == 0 {
+            return refuse(HeaderField::GeometrySpans);
+        }
+        if !rules::STEP_EXPONENT.contains(&self.step_exponent) {
+            return refuse(HeaderField::StepExponent);
+        }
+        if !(self.q_scale > 0.0 && self.q_scale.is_finite()) {
+            return refuse(HeaderField::QScale);
+        }
+        if self.tick_ns == 0 || self.tick_ns > 1_000_000_000 {
+            return refuse(HeaderField::Tick);
+        }
+        Ok(())
+    }
+
+    /// Length of one grid step in u; exact. 1 if the exponent is out of range.
+    pub fn step(&self) -> f32 {
+        let biased = 127i32 + i32::from(self.step_exponent);
+        if (1..=254).contains(&biased) { f32::from_bits((biased as u32) << 23) } else { 1.0 }
+    }
+
+    /// Length of the two shared streams together [bytes].
+    pub const fn shared_bytes(&self) -> u64 {
+        self.geometry_bytes as u64 + self.span_bytes as u64
+    }
+}
+
+impl AxisHeader {
+    /// Refuses fields that no table has.
+    pub fn check(&self) -> Result<(), TableError> {
+        if self.fraction_bits > rules::MAX_FRACTION_BITS {
+            return Err(TableError::Header(HeaderField::FractionBits));
+        }
+        if !self.limits.are_valid() {
+            return Err(TableError::Header(HeaderField::Limits));
+        }
+        Ok(())
+    }
+}
+
+impl Limits {
+    /// All limits are finite and positive.
+    pub fn are_valid(&self) -> bool {
+        let good = |x: f32| x > 0.0 && x.is_finite();
+        good(self.velocity) && good(self.acceleration) && self.jerk.is_none_or(good)
+    }
+}
