@@ -201,8 +201,10 @@ fn plan_section<E>(
     let limits: Vec<AxisLimits> = machine.axes.iter().map(|axis| set.of(axis, kind)).collect();
     let problem =
         Problem { path: &path, limits: &limits, caps: &marks.caps, shortest_span_s: machine.control_tick_s };
-    let plan = topp::plan(&problem, settings)
-        .map_err(|fault| JobError::Plan { line: marks.line_at(fault.place().unwrap_or(0.0) / path.step), fault })?;
+    let plan = topp::plan(&problem, settings).map_err(|fault| JobError::Plan {
+        line: marks.line_at(fault.place().unwrap_or(0.0) / path.step),
+        fault,
+    })?;
     let certificate = certify(&plan.table, &limits, &marks.caps);
     let section = PlannedSection { kind, limits, table: plan.table, marks };
     Ok(Planned::Section { section, certificate, binding: plan.binding, iterations: plan.iterations })

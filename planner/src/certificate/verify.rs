@@ -197,7 +197,8 @@ impl VerifyReport {
             *whole = whole.max(*part);
         }
         for &place in &c.worst {
-            let found = WorstInJob { table, line: section.marks.line_at(place.u / section.table.path.step), place };
+            let found =
+                WorstInJob { table, line: section.marks.line_at(place.u / section.table.path.step), place };
             match self.worst.iter_mut().find(|w| w.place.kind == place.kind) {
                 Some(held) if held.place.bound < place.bound => *held = found,
                 Some(_) => {}

@@ -7,6 +7,8 @@
 //!
 //! The seam to other fitters is [`fit`]: contour and demand in, spline out.
 
+use protocol::table::rules;
+
 use super::certify::{Metric, SpanCurve, within};
 use super::contour::{Contour, REVERSAL, norm};
 use super::knots::Knots;
@@ -49,9 +51,6 @@ const MOST_SPANS: usize = 1 << 22;
 
 /// Most grid steps of one section: multiples of the step stay exact.
 const MOST_STEPS: u64 = 1 << 52;
-
-/// Most grid steps of one span: the table counts them in 32 bits.
-const MOST_SPAN_STEPS: u64 = 1 << 31;
 
 /// Fits a spline to a contour whose length is a whole number of grid steps.
 pub(super) fn fit(contour: &Contour, demand: &Demand<'_>) -> Result<Spline, Unfit> {
@@ -97,6 +96,9 @@ fn fewest_spans(contour: &Contour, demand: &Demand<'_>) -> f64 {
     });
     spans.sum()
 }
+
+/// How much finer the grid becomes when a span of one step has to be halved.
+const FINER: u32 = 8;
 
 /// Passes after which splitting spreads faster and faster: halving a span can make its neighbour fail, and a
 /// long row of spans that only just held must not fall one by one.
@@ -267,13 +269,14 @@ impl<'a> Fitter<'a> {
         SpanCurve::new(t[2], t[3] - t[2], &b, self.axes)
     }
 
-    /// Whether some axis moves further in span `j` than a span may, measured as the table does from control
-    /// point `j + 1`.
+    /// Whether some axis moves further around span `j` than the table can say: between neighbouring control
+    /// points, or from control point `j + 1` to any place of the span.
     fn too_long(&self, j: usize, curve: &SpanCurve) -> bool {
         let points = curve.points();
         (0..self.axes).any(|a| {
-            let base = self.controls[(j + 1) * self.axes + a];
-            points.iter().any(|p| (p[a] - base).abs() > self.demand.reach[a])
+            let control = |k: usize| self.controls[(j + k) * self.axes + a];
+            let far = |x: f64, y: f64| (x - y).abs() > self.demand.reach[a];
+            points.iter().any(|p| far(p[a], control(1))) || (0..3).any(|k| far(control(k), control(k + 1)))
         })
     }
 
@@ -308,7 +311,7 @@ impl<'a> Fitter<'a> {
     fn judge(&self, j: usize, first: usize, plain: bool) -> Result<Verdict, Unfit> {
         let good = |c: &SpanCurve| within(c, self.contour, first, self.demand.metric);
         let curve = self.curve(j, &self.controls);
-        if self.too_long(j, &curve) || self.knots.length(j) > MOST_SPAN_STEPS {
+        if self.too_long(j, &curve) || self.knots.length(j) >= u64::from(rules::MAX_GEOMETRY_LENGTH) {
             return Ok(Verdict::Split);
         }
         let can_be_plain = plain && self.plain[j..j + 4].contains(&false);
@@ -381,9 +384,10 @@ impl<'a> Fitter<'a> {
     fn halve(&mut self, split: &[bool]) -> Result<(), Unfit> {
         let stuck = (0..split.len()).find(|&i| split[i] && self.knots.length(i) < 2);
         if let Some(i) = stuck {
-            self.knots.refine(16);
+            self.knots.refine(FINER);
             let here = self.contour.seek(0, self.knots.at[i] as f64 * self.knots.step);
-            if self.knots.at.last().is_some_and(|&end| end > MOST_STEPS) {
+            let finest = f64::from(*rules::STEP_EXPONENT.start()).exp2();
+            if self.knots.step < finest || self.knots.at.last().is_some_and(|&end| end > MOST_STEPS) {
                 return Err(Unfit::TooManySpans(here));
             }
         }

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use protocol::table::rules;
+
 use super::certify::{Metric, certify};
 use super::contour::{Contour, norm};
 use super::fit::{Demand, Unfit, fit};
@@ -12,8 +14,8 @@ use super::section::{Marks, Section};
 use crate::job::machine::{Axis, AxisLimits, MAX_AXES, Machine, Point};
 use crate::job::program::{Item, MoveKind, StopCause};
 
-/// Most drive counts that an axis moves in one geometry span.
-const SPAN_COUNTS: f64 = (1u32 << 20) as f64 * 0.98;
+/// Most drive counts that an axis moves in one geometry span, with room for rounding.
+const SPAN_COUNTS: f64 = rules::MAX_CONTROL_STEP as f64 * 0.98;
 
 /// Coarsest grid step in u.
 const COARSEST_STEP: f64 = 1.0 / 128.0;
@@ -268,7 +270,7 @@ impl<I> Sections<I> {
         if step < length / LARGEST_CONTROL {
             return Err(GeometryError::TooManySpans { line });
         }
-        contour.stretch_to((length / step).round() * step);
+        contour.stretch_to((length / step).round().max(1.0) * step);
         contour.shift(&from, &to, &self.metric);
         let mut reach = [f64::INFINITY; MAX_AXES];
         for (reach, axis) in reach.iter_mut().zip(&self.machine.axes) {

@@ -4,9 +4,7 @@
 //! take the tangent of 1/sqrt(q) and the gradient of the time at the last answer.
 
 use ::clarabel::algebra::CscMatrix;
-use ::clarabel::solver::{
-    DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus,
-};
+use ::clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
 
 use super::layout::Pieces;
 use super::rows::{CellRows, RowSource, dot};
@@ -80,9 +78,8 @@ fn time(source: &RowSource, x: &[f64]) -> (f64, Vec<f64>) {
         let c = controls(x, s);
         let root = 0.15f64.sqrt();
         for (t, w) in [(0.5 - root, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + root, 5.0 / 18.0)] {
-            let a = [0, 1, 2].map(|j| {
-                (1.0 - t) * (1.0 - t) * b[0][j] + 2.0 * t * (1.0 - t) * b[1][j] + t * t * b[2][j]
-            });
+            let a = [0, 1, 2]
+                .map(|j| (1.0 - t) * (1.0 - t) * b[0][j] + 2.0 * t * (1.0 - t) * b[1][j] + t * t * b[2][j]);
             let value = dot(&a, &c);
             let part = w * h[s + 1] / value.sqrt();
             total += part;

@@ -145,7 +145,11 @@ impl<'a> Estimate<'a> {
         let length = path.length();
         // Away from rest under constant jerk: q = (6^(4/3)/4) (J/|p'|)^(2/3) u^(4/3).
         let from_rest = |d: f64, jerk: f64| {
-            if jerk.is_finite() { 6f64.powf(4.0 / 3.0) / 4.0 * (jerk * d * d).powf(2.0 / 3.0) } else { f64::INFINITY }
+            if jerk.is_finite() {
+                6f64.powf(4.0 / 3.0) / 4.0 * (jerk * d * d).powf(2.0 / 3.0)
+            } else {
+                f64::INFINITY
+            }
         };
         let speed: Vec<f64> = u
             .iter()
@@ -229,7 +233,11 @@ fn ramp(problem: &Problem, sweep: &Sweep) -> f64 {
         .zip(moving)
         .filter(|(_, moving)| *moving)
         .map(|(l, _)| {
-            if l.jerk.is_finite() { l.acceleration / l.jerk } else { SPEED_RAMP_SHARE * l.velocity / l.acceleration }
+            if l.jerk.is_finite() {
+                l.acceleration / l.jerk
+            } else {
+                SPEED_RAMP_SHARE * l.velocity / l.acceleration
+            }
         })
         .fold(f64::INFINITY, f64::min);
     let swept = sweep.duration();

@@ -22,9 +22,9 @@ mod window;
 
 pub use error::{LimitKind, PathFault, PlanError};
 
+use crate::job::machine::AxisLimits;
 use layout::{Derivatives, Layout, Pieces, strictest};
 use problem::{Plan, Problem, Settings, Solver};
-use crate::job::machine::AxisLimits;
 use rows::RowSource;
 use sweep::Sweep;
 
@@ -54,7 +54,13 @@ pub fn plan(problem: &Problem, settings: &Settings) -> Result<Plan, PlanError> {
         let plan = solve(problem, settings, &sweep, &layout, &mut iterations)?;
         if std::env::var("DBG").is_ok() {
             for i in 0..plan.table.spans() {
-                println!("{i} h {:.3e} {:?} T {:.3e} {:?}", layout.h[i], plan.table.law(i), plan.table.law(i).duration(), plan.binding[i]);
+                println!(
+                    "{i} h {:.3e} {:?} T {:.3e} {:?}",
+                    layout.h[i],
+                    plan.table.law(i),
+                    plan.table.law(i).duration(),
+                    plan.binding[i]
+                );
             }
             println!();
         }
@@ -119,8 +125,13 @@ fn solve(
     iterations: &mut u64,
 ) -> Result<Plan, PlanError> {
     let unit = sweep.q.iter().copied().fold(0.0, f64::max);
-    let mut source =
-        RowSource { problem: *problem, layout, unit, ceiling: CEILING, joint: joints(problem, layout).map(|q| q / unit) };
+    let mut source = RowSource {
+        problem: *problem,
+        layout,
+        unit,
+        ceiling: CEILING,
+        joint: joints(problem, layout).map(|q| q / unit),
+    };
     let mut worst = 1;
     for _ in 0..MOST_RESCALES {
         source.joint = joints(problem, layout).map(|q| (q / unit).min(source.ceiling));
@@ -152,7 +163,8 @@ fn optimise(
     let mut x = start::profile(source);
     match settings.solver {
         Solver::InteriorPoint => {
-            *iterations += window::solve(source, &mut x, half, settings.relative_gap).ok_or(PlanError::Solver)?;
+            *iterations +=
+                window::solve(source, &mut x, half, settings.relative_gap).ok_or(PlanError::Solver)?;
             Ok(x)
         }
         Solver::Clarabel => {

@@ -5,9 +5,9 @@ mod oracle;
 
 use self::families::{Rng, cap, circle, limits, line, settings, walk, zigzag};
 use self::oracle::Oracle;
+use super::plan;
 use super::problem::{Plan, Problem, Settings, Solver};
 use super::sweep::Sweep;
-use super::plan;
 use crate::geometry::grid_path::GridPath;
 use crate::geometry::section::{FeedCap, SpeedCap};
 use crate::job::machine::AxisLimits;
@@ -17,7 +17,13 @@ fn planned(name: &str, path: &GridPath, limits: &[AxisLimits], caps: &[FeedCap])
     let before = std::time::Instant::now();
     let plan = plan(&problem, &settings()).unwrap_or_else(|e| panic!("{name}: {e}"));
     let took = before.elapsed().as_secs_f64();
-    println!("{name}: {} spans T {} sweep {} it {} took {took:.4}", plan.table.spans(), plan.table.duration(), Sweep::new(&problem).duration(), plan.iterations);
+    println!(
+        "{name}: {} spans T {} sweep {} it {} took {took:.4}",
+        plan.table.spans(),
+        plan.table.duration(),
+        Sweep::new(&problem).duration(),
+        plan.iterations
+    );
     let oracle = Oracle::of(&problem, &plan.table);
     println!("   {oracle:?}");
     oracle.assert_sound(&problem, &plan);
@@ -70,10 +76,20 @@ fn exp_walks() {
     let path = zigzag(&mut rng, 600, 0.2);
     planned("zigzag", &path, &limits(2, 100.0, 500.0, 1e4), &[]);
     planned("zigzag fast", &path, &limits(2, 150.0, 1500.0, 5e4), &[]);
-    planned("zigzag F", &path, &limits(2, 150.0, 1500.0, 5e4), &cap(&path, SpeedCap::Tangential { axes: 3, speed: 2.0 }));
+    planned(
+        "zigzag F",
+        &path,
+        &limits(2, 150.0, 1500.0, 5e4),
+        &cap(&path, SpeedCap::Tangential { axes: 3, speed: 2.0 }),
+    );
     let path = circle(10.0, 3.0, 36);
     planned("circle", &path, &limits(2, 100.0, 500.0, 1e4), &[]);
-    planned("circle slow", &path, &limits(2, 100.0, 500.0, 1e4), &cap(&path, SpeedCap::Tangential { axes: 3, speed: 0.1 }));
+    planned(
+        "circle slow",
+        &path,
+        &limits(2, 100.0, 500.0, 1e4),
+        &cap(&path, SpeedCap::Tangential { axes: 3, speed: 0.1 }),
+    );
     let path = circle(0.05, 3.0, 36);
     planned("circle small", &path, &limits(2, 100.0, 500.0, 1e4), &[]);
 }

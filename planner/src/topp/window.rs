@@ -41,7 +41,14 @@ pub(super) fn solve(source: &RowSource, x: &mut Vec<f64>, half: &[f64], relative
     };
     let margin = |s: usize| if near_joint(s) { JOINT_MARGIN } else { 0.0 };
     let gap = relative_gap.max(JOINT_MARGIN.min(1e-4));
-    let first = stage(source, x, half, &windows, margin, Effort { relative_gap: gap.min(relative_gap * 10.0), warmth: 1.0 });
+    let first = stage(
+        source,
+        x,
+        half,
+        &windows,
+        margin,
+        Effort { relative_gap: gap.min(relative_gap * 10.0), warmth: 1.0 },
+    );
     let seams: Vec<Stretch> =
         joints[1..count].iter().map(|&j| Stretch { from: j - REACH, to: j + REACH }).collect();
     let second = stage(source, x, half, &seams, |_| 0.0, Effort { relative_gap, warmth: 1.0 });

@@ -204,7 +204,8 @@ impl Cell {
     /// Sets the tangent that makes the least slack largest (concave in s): golden section round 1/sqrt(x).
     fn best_tangent(&mut self, pairs: &[Pair], c: &[f64; 3]) {
         let x = [0, 1, 2].map(|k| dot(&self.x[k], c).max(f64::MIN_POSITIVE));
-        let (low, high) = (x.iter().copied().fold(f64::INFINITY, f64::min), x.iter().copied().fold(0.0, f64::max));
+        let (low, high) =
+            (x.iter().copied().fold(f64::INFINITY, f64::min), x.iter().copied().fold(0.0, f64::max));
         let (mut a, mut b) = (0.5 / high.sqrt(), 2.0 / low.sqrt());
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let at = |s: f64| self.jerk_slack(pairs, s, c);
@@ -293,7 +294,8 @@ impl Rows {
                         let before = t.base[k] - t.alpha * p.phi[l];
                         let after = n.base[k] - n.alpha * p.phi[l];
                         let (down, up) = (before - t.alpha * f[l], before + t.alpha * f[l]);
-                        let keep = (after - n.alpha * f[l] - KEPT * down).min(after + n.alpha * f[l] - KEPT * up);
+                        let keep =
+                            (after - n.alpha * f[l] - KEPT * down).min(after + n.alpha * f[l] - KEPT * up);
                         worst[l] = worst[l].min(keep);
                     }
                 }
@@ -437,7 +439,14 @@ fn numbered<'a>(pairs: &'a mut [Pair], cell: &Cell) -> impl Iterator<Item = (&'a
 impl Pair {
     /// Both rows of each pair and their slacks.
     #[inline(always)]
-    fn sides(&self, f: &Lanes, t: &Tangent, rhs: f64, block: usize, jerk: bool) -> ([[Lanes; 3]; 2], [Lanes; 2]) {
+    fn sides(
+        &self,
+        f: &Lanes,
+        t: &Tangent,
+        rhs: f64,
+        block: usize,
+        jerk: bool,
+    ) -> ([[Lanes; 3]; 2], [Lanes; 2]) {
         if !jerk {
             let minus = self.f.map(|a| a.map(|v| -v));
             return ([self.f, minus], [lanes(|l| rhs - f[l]), lanes(|l| rhs + f[l])]);
