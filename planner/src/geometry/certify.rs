@@ -131,10 +131,11 @@ impl SpanCurve {
         let (t, w) = ((from - self.start) / self.length, (to - from) / self.length);
         let (x, dx) = (from - origin, to - from);
         let mut d = [[0.0; MAX_AXES]; 4];
-        for a in 0..self.axes {
+        let slopes = p.slope.iter().zip(&p.start).take(self.axes);
+        for (a, (slope, start)) in slopes.enumerate() {
             let [p1, p2, p3] = [self.power[0][a], self.power[1][a], self.power[2][a]];
-            let value = self.origin[a] - p.start[a] - p.slope[a] * x + t * (p1 + t * (p2 + t * p3));
-            let q1 = w * (p1 + t * (2.0 * p2 + 3.0 * t * p3)) - p.slope[a] * dx;
+            let value = self.origin[a] - start - slope * x + t * (p1 + t * (p2 + t * p3));
+            let q1 = w * (p1 + t * (2.0 * p2 + 3.0 * t * p3)) - slope * dx;
             let (q2, q3) = (w * w * (p2 + 3.0 * t * p3), w * w * w * p3);
             d[0][a] = value;
             d[1][a] = value + q1 / 3.0;
@@ -243,11 +244,10 @@ pub(super) fn certify(path: &GridPath, contour: &Contour, metric: &Metric) -> Ce
     }
     for span in 0..path.spans() {
         let mut b = [[0.0; MAX_AXES]; 4];
-        for axis in 0..metric.axes {
+        for (axis, grid) in path.axes.iter().enumerate().take(metric.axes) {
             let (base, offsets) = path.bezier(axis, span);
-            let origin = base as f64 * path.axes[axis].lsb;
-            for k in 0..4 {
-                b[k][axis] = origin + offsets[k];
+            for (b, offset) in b.iter_mut().zip(offsets) {
+                b[axis] = base as f64 * grid.lsb + offset;
             }
         }
         let start = path.breaks[span] as f64 * path.step;

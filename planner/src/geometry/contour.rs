@@ -7,6 +7,9 @@ use super::certify::Metric;
 use crate::job::machine::{MAX_AXES, Point};
 use crate::job::program::{Arc, Feed};
 
+/// Turning further than this is a reversal [rad].
+pub(super) const REVERSAL: f64 = 170.0 * std::f64::consts::PI / 180.0;
+
 /// A joint is a corner if min(L) sin(theta/2) exceeds this many tolerances. A sagitta of min(L) theta / 8 above
 /// the tolerance already tells a corner from a sample of a curve; below this limit, though, a pair of knots at the
 /// vertex has to be shorter than the tolerance allows, and knots placed by the error alone give faster paths.

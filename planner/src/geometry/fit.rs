@@ -7,8 +7,10 @@
 //!
 //! The seam to other fitters is [`fit`]: contour and demand in, spline out.
 
+use protocol::table::rules;
+
 use super::certify::{Metric, SpanCurve, within};
-use super::contour::Contour;
+use super::contour::{Contour, REVERSAL, norm};
 use super::knots::Knots;
 use crate::job::machine::{MAX_AXES, Point};
 use crate::tolerances::{SLOW_PARAMETER, STANDSTILL_PARAMETER};
@@ -45,28 +47,62 @@ pub(super) enum Unfit {
 }
 
 /// Most spans of one section.
-const MOST_SPANS: usize = 1 << 24;
+const MOST_SPANS: usize = 1 << 22;
 
 /// Most grid steps of one section: multiples of the step stay exact.
 const MOST_STEPS: u64 = 1 << 52;
 
 /// Fits a spline to a contour whose length is a whole number of grid steps.
 pub(super) fn fit(contour: &Contour, demand: &Demand<'_>) -> Result<Spline, Unfit> {
+    if fewest_spans(contour, demand) > MOST_SPANS as f64 {
+        return Err(Unfit::TooManySpans(0));
+    }
     let knots = Knots::coarse(contour, demand.step, demand.longest);
     let mut fitter = Fitter::new(contour, demand, knots);
-    loop {
+    for pass in 0.. {
         let mut split = vec![false; fitter.knots.spans()];
-        let plain = fitter.examine(&mut split)?;
+        let plain = fitter.examine(&mut split, pass < QUIET_PASSES)?;
+        if pass >= QUIET_PASSES {
+            widen(&mut split, 1usize.checked_shl(pass - QUIET_PASSES).unwrap_or(usize::MAX));
+        }
         fitter.knots.grade(&mut split);
         let any = split.iter().any(|&s| s);
         if !any && !plain {
-            return Ok(Spline { knots: fitter.knots, controls: fitter.controls });
+            break;
         }
         if any {
             fitter.halve(&split)?;
         }
     }
+    Ok(Spline { knots: fitter.knots, controls: fitter.controls })
 }
+
+/// Marks everything within `reach` of a mark.
+fn widen(split: &mut [bool], reach: usize) {
+    let marks: Vec<usize> = (0..split.len()).filter(|&i| split[i]).collect();
+    for i in marks {
+        let end = i.saturating_add(reach).min(split.len() - 1);
+        split[i.saturating_sub(reach)..=end].fill(true);
+    }
+}
+
+/// A lower bound of the spans a contour takes, to refuse the absurd before anything is allocated.
+fn fewest_spans(contour: &Contour, demand: &Demand<'_>) -> f64 {
+    let spans = contour.primitives.iter().enumerate().map(|(k, p)| {
+        let length = contour.length_of(k);
+        let reach =
+            p.slope.iter().zip(demand.reach).fold(0.0f64, |m, (v, reach)| m.max(v.abs() * length / reach));
+        if p.round.is_some() { reach.max(length / demand.longest) } else { reach }
+    });
+    spans.sum()
+}
+
+/// How much finer the grid becomes when a span of one step has to be halved.
+const FINER: u32 = 8;
+
+/// Passes after which splitting spreads faster and faster: halving a span can make its neighbour fail, and a
+/// long row of spans that only just held must not fall one by one.
+const QUIET_PASSES: u32 = 32;
 
 /// What to do about a span.
 enum Verdict {
@@ -144,6 +180,8 @@ impl<'a> Fitter<'a> {
         let u = (knots[0] + knots[1] + knots[2]) / 3.0;
         let (ul, ur) = (self.greville(i - 1), self.greville(i + 1));
         let spread = knots.iter().map(|t| (t - u) * (t - u)).sum::<f64>() / 12.0;
+        // What uneven knots add: the blossom of x^3 at the three knots.
+        let skew = knots.iter().map(|t| t - u).product::<f64>();
         let k = self.contour.seek(hint, u);
         let p = &self.contour.primitives[k];
         let origin = self.contour.start_of(k);
@@ -151,22 +189,59 @@ impl<'a> Fitter<'a> {
             if let Some(round) = &p.round {
                 // (1 + v + v^2/2 + ..) cancels the radius that a spline of points on the circle loses, to the
                 // fourth order on even knots: 3 / (2 + cos phi) with v = phi^2 / 6.
-                let v = (spread * round.angle_slope * round.angle_slope).min(1.0);
-                let (e, _) = round.at(u - origin);
-                for (e, axis) in e.into_iter().zip(round.plane) {
-                    self.controls[at + axis] += e * v * (1.0 + 0.5 * v);
+                let squared = round.angle_slope * round.angle_slope;
+                let v = (spread * squared).min(1.0);
+                let (e, tangent) = round.at(u - origin);
+                let third = if v < 1.0 { skew * squared / 6.0 } else { 0.0 };
+                for (k, axis) in round.plane.into_iter().enumerate() {
+                    self.controls[at + axis] += e[k] * v * (1.0 + 0.5 * v) - third * tangent[k];
                 }
             }
             return k;
         }
-        let (before, after) = (at - n, at + n);
-        for a in 0..n {
-            let f = self.samples[at + a];
-            let slopes =
-                [(f - self.samples[before + a]) / (u - ul), (self.samples[after + a] - f) / (ur - u)];
-            self.controls[at + a] -= 2.0 * spread * (slopes[1] - slopes[0]) / (ur - ul);
-        }
+        self.difference(i, [ul, u, ur], spread, skew);
         k
+    }
+
+    /// Corrects control point `i` by divided differences of the samples around it, at `x` and beyond.
+    fn difference(&mut self, i: usize, x: [f64; 3], spread: f64, skew: f64) {
+        let n = self.axes;
+        let f = |j: usize, a: usize| self.samples[j * n + a];
+        let first =
+            |a: usize| [(f(i, a) - f(i - 1, a)) / (x[1] - x[0]), (f(i + 1, a) - f(i, a)) / (x[2] - x[1])];
+        let second = |a: usize| {
+            let [l, r] = first(a);
+            (r - l) / (x[2] - x[0])
+        };
+        let mut correction = [0.0; MAX_AXES];
+        for (a, c) in correction.iter_mut().enumerate().take(n) {
+            *c = -2.0 * spread * second(a);
+        }
+        // On uneven knots the third difference counts too: in C''(x) and in the blossom. It is left out where it
+        // would rule, as it does at corners.
+        if i >= 2 && i + 2 < self.plain.len() && skew != 0.0 {
+            let (far_left, far_right) = (self.greville(i - 2), self.greville(i + 2));
+            let uneven = (x[2] - x[1]) - (x[1] - x[0]);
+            let factor = skew + 2.0 * spread * uneven;
+            let mut extra = [0.0; MAX_AXES];
+            for (a, e) in extra.iter_mut().enumerate().take(n) {
+                let [l, r] = first(a);
+                let before = (l - (f(i - 1, a) - f(i - 2, a)) / (x[0] - far_left)) / (x[1] - far_left);
+                let after = ((f(i + 2, a) - f(i + 1, a)) / (far_right - x[2]) - r) / (far_right - x[1]);
+                // Mean of the third differences to the left and to the right.
+                let left = (second(a) - before) / (x[2] - far_left);
+                let right = (after - second(a)) / (far_right - x[0]);
+                *e = factor * 0.5 * (left + right);
+            }
+            if norm(&extra) < 0.5 * norm(&correction) {
+                for (c, e) in correction.iter_mut().zip(extra) {
+                    *c += e;
+                }
+            }
+        }
+        for (c, d) in self.controls[i * n..][..n].iter_mut().zip(correction) {
+            *c += d;
+        }
     }
 
     /// The curve of span `j` with the given control points.
@@ -194,18 +269,20 @@ impl<'a> Fitter<'a> {
         SpanCurve::new(t[2], t[3] - t[2], &b, self.axes)
     }
 
-    /// Whether some axis moves further in span `j` than a span may, measured as the table does from control
-    /// point `j + 1`.
+    /// Whether some axis moves further around span `j` than the table can say: between neighbouring control
+    /// points, or from control point `j + 1` to any place of the span.
     fn too_long(&self, j: usize, curve: &SpanCurve) -> bool {
         let points = curve.points();
         (0..self.axes).any(|a| {
-            let base = self.controls[(j + 1) * self.axes + a];
-            points.iter().any(|p| (p[a] - base).abs() > self.demand.reach[a])
+            let control = |k: usize| self.controls[(j + k) * self.axes + a];
+            let far = |x: f64, y: f64| (x - y).abs() > self.demand.reach[a];
+            points.iter().any(|p| far(p[a], control(1))) || (0..3).any(|k| far(control(k), control(k + 1)))
         })
     }
 
-    /// Judges the open spans. Marks those to split; returns whether control points changed.
-    fn examine(&mut self, split: &mut [bool]) -> Result<bool, Unfit> {
+    /// Judges the open spans. Marks those to split; returns whether control points became plain, which they may
+    /// only if `plain`.
+    fn examine(&mut self, split: &mut [bool], plain: bool) -> Result<bool, Unfit> {
         let mut changed = false;
         let mut hint = 0;
         for j in 0..split.len() {
@@ -213,7 +290,7 @@ impl<'a> Fitter<'a> {
                 continue;
             }
             hint = self.contour.seek(hint, self.knots.at[j] as f64 * self.knots.step);
-            match self.judge(j, hint)? {
+            match self.judge(j, hint, plain)? {
                 Verdict::Good => self.open[j] = false,
                 Verdict::Split => split[j] = true,
                 Verdict::Plain => {
@@ -231,13 +308,13 @@ impl<'a> Fitter<'a> {
         Ok(changed)
     }
 
-    fn judge(&self, j: usize, first: usize) -> Result<Verdict, Unfit> {
+    fn judge(&self, j: usize, first: usize, plain: bool) -> Result<Verdict, Unfit> {
         let good = |c: &SpanCurve| within(c, self.contour, first, self.demand.metric);
         let curve = self.curve(j, &self.controls);
-        if self.too_long(j, &curve) {
+        if self.too_long(j, &curve) || self.knots.length(j) >= u64::from(rules::MAX_GEOMETRY_LENGTH) {
             return Ok(Verdict::Split);
         }
-        let can_be_plain = self.plain[j..j + 4].contains(&false);
+        let can_be_plain = plain && self.plain[j..j + 4].contains(&false);
         if !good(&curve) {
             let plain = can_be_plain && good(&self.curve(j, &self.samples));
             return Ok(if plain { Verdict::Plain } else { Verdict::Split });
@@ -257,8 +334,17 @@ impl<'a> Fitter<'a> {
         can_be_plain: bool,
     ) -> Result<Verdict, Unfit> {
         let (sharpest, turn, tolerance) = self.sharpest_joint(j, first);
-        let wanted = SLOW_PARAMETER.min(0.6 * (0.5 * turn).cos());
         let slowest = slowest(curve);
+        if let (Some(k), true) = (sharpest, turn > REVERSAL) {
+            // Too short a reversal for a stop, unless the path lingers on it; no knot could help that.
+            return if slowest < 2.0 * STANDSTILL_PARAMETER {
+                Err(Unfit::StopAt(k))
+            } else {
+                Ok(Verdict::Good)
+            };
+        }
+        // A spline slows to cos(theta/2) in any corner.
+        let wanted = SLOW_PARAMETER.min(0.6 * (0.5 * turn).cos());
         if slowest >= wanted {
             return Ok(Verdict::Good);
         }
@@ -298,9 +384,10 @@ impl<'a> Fitter<'a> {
     fn halve(&mut self, split: &[bool]) -> Result<(), Unfit> {
         let stuck = (0..split.len()).find(|&i| split[i] && self.knots.length(i) < 2);
         if let Some(i) = stuck {
-            self.knots.refine(16);
+            self.knots.refine(FINER);
             let here = self.contour.seek(0, self.knots.at[i] as f64 * self.knots.step);
-            if self.knots.at.last().is_some_and(|&end| end > MOST_STEPS) {
+            let finest = f64::from(*rules::STEP_EXPONENT.start()).exp2();
+            if self.knots.step < finest || self.knots.at.last().is_some_and(|&end| end > MOST_STEPS) {
                 return Err(Unfit::TooManySpans(here));
             }
         }
@@ -329,14 +416,14 @@ impl<'a> Fitter<'a> {
         let mut stale_sample = vec![false; spans + 3];
         let mut stale = vec![false; spans + 3];
         for i in 0..spans + 3 {
-            // Control i rests on knots i-2 ..= i; its neighbours' samples reach one further.
+            // Control i rests on knots i-2 ..= i; the samples of two neighbours each side reach two further.
             match kept(i as isize - 1, 1, 1) {
                 Some(old) => {
                     let from = (old + 1) as usize;
                     samples[i * n..][..n].copy_from_slice(&self.samples[from * n..][..n]);
                     controls[i * n..][..n].copy_from_slice(&self.controls[from * n..][..n]);
                     plain[i] = self.plain[from];
-                    stale[i] = kept(i as isize - 1, 2, 2).is_none();
+                    stale[i] = kept(i as isize - 1, 3, 3).is_none();
                 }
                 None => (stale_sample[i], stale[i]) = (true, true),
             }
@@ -349,14 +436,14 @@ impl<'a> Fitter<'a> {
         }
         (self.samples, self.controls, self.plain, self.open) = (samples, controls, plain, open);
         let mut hint = 0;
-        for i in 0..spans + 3 {
-            if stale_sample[i] {
+        for (i, stale) in stale_sample.into_iter().enumerate() {
+            if stale {
                 hint = self.sample(i, hint);
             }
         }
         let mut hint = 0;
-        for i in 0..spans + 3 {
-            if stale[i] {
+        for (i, stale) in stale.into_iter().enumerate() {
+            if stale {
                 hint = self.place(i, hint);
             }
         }

@@ -1,14 +1,11 @@
 //! Gathering moves into a contour, up to where motion must rest.
 
 use super::certify::Metric;
-use super::contour::{Contour, Primitive, angle, distance};
+use super::contour::{Contour, Primitive, REVERSAL, angle, distance};
 use super::sections::{GeometryError, PathSettings};
 use crate::job::machine::Point;
 use crate::job::program::{Corner, Feed, Move, MoveKind, Shape, StopCause};
 use crate::tolerances::{CONTOUR_GAP, ZERO_COUNT, ZERO_LENGTH};
-
-/// Turning further than this is a reversal [rad].
-const REVERSAL: f64 = 170.0 * std::f64::consts::PI / 180.0;
 
 /// On an exact path, turning further than this is a corner [rad].
 const EXACT_CORNER: f64 = 0.1 * std::f64::consts::PI / 180.0;
@@ -213,7 +210,7 @@ impl Gather {
     /// Makes a primitive of the tail.
     fn flush(&mut self) {
         let Some(tail) = self.tail.take() else { return };
-        if tail.start == tail.end {
+        if distance(&tail.start, &tail.end) == 0.0 {
             return;
         }
         let (mut p, length) = Primitive::line(&tail.start, &tail.end, tail.tolerance, tail.feed, tail.line);

@@ -1,13 +1,12 @@
 //! Rounding a spline to integers: a path that the feed table carries exactly.
 
+use protocol::table::rules;
+
 use super::certify::Metric;
 use super::fit::Spline;
 use super::grid_path::{GridAxis, GridPath};
 use crate::job::machine::Machine;
 use crate::tolerances::{LSB_OVER_SPAN, LSB_OVER_TOLERANCE};
-
-/// Finest division of a drive count: 2^-16.
-const FINEST: u32 = 16;
 
 /// Largest control point: every integer up to it is exact in f64.
 pub(super) const LARGEST_CONTROL: f64 = (1u64 << 52) as f64;
@@ -26,6 +25,7 @@ pub(super) fn round(
 ) -> Option<GridPath> {
     let knots = &spline.knots;
     let shortest = (0..knots.spans()).map(|i| knots.length(i)).min().unwrap_or(1) as f64 * knots.step;
+    let finest = u32::from(rules::MAX_FRACTION_BITS);
     let n = metric.axes;
     let controls = knots.spans() + 3;
     let mut axes = Vec::with_capacity(n);
@@ -33,7 +33,7 @@ pub(super) fn round(
         let own = if metric.is_linear(a) { tolerance } else { tolerance / metric.rotary_scale(tolerance) };
         let wanted = (LSB_OVER_TOLERANCE * own).min(LSB_OVER_SPAN * shortest);
         let count = 1.0 / axis.counts_per_unit;
-        let divisions = (0..FINEST).find(|&f| count / f64::from(1u32 << f) <= wanted).unwrap_or(FINEST);
+        let divisions = (0..finest).find(|&f| count / f64::from(1u32 << f) <= wanted).unwrap_or(finest);
         let scale = f64::from(1u32 << divisions);
         let mut values = Vec::with_capacity(controls);
         for i in 0..controls {

@@ -2,8 +2,10 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use protocol::table::rules;
+
 use super::certify::{Metric, certify};
-use super::contour::Contour;
+use super::contour::{Contour, norm};
 use super::fit::{Demand, Unfit, fit};
 use super::gather::Gather;
 use super::marks::marks;
@@ -12,11 +14,15 @@ use super::section::{Marks, Section};
 use crate::job::machine::{Axis, AxisLimits, MAX_AXES, Machine, Point};
 use crate::job::program::{Item, MoveKind, StopCause};
 
-/// Most drive counts that an axis moves in one geometry span.
-const SPAN_COUNTS: f64 = (1u32 << 20) as f64 * 0.98;
+/// Most drive counts that an axis moves in one geometry span, with room for rounding.
+const SPAN_COUNTS: f64 = rules::MAX_CONTROL_STEP as f64 * 0.98;
 
 /// Coarsest grid step in u.
 const COARSEST_STEP: f64 = 1.0 / 128.0;
+
+/// Rest spans make the grid no finer than this many steps per section: almost unlimited jerk asks for rest spans
+/// that no drive could tell from none.
+const FINEST_FOR_REST: f64 = (1u32 << 31) as f64;
 
 /// How paths are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -267,15 +273,17 @@ impl<I> Sections<I> {
             MoveKind::Feed => self.settings.feed_rest_span,
             MoveKind::Rapid => self.settings.rapid_rest_span,
         };
-        let length = contour.length();
-        let step = power_of_two_below(
-            COARSEST_STEP.min(length / 1024.0).min(rest.max(f64::MIN_POSITIVE) / 16.0).min(tolerance / 10.0),
-        );
+        let [from, to] = [(&start, &first), (&stop, &last)].map(|(counts, p)| self.offset(counts, p));
+        // A move of less than a count may still move a drive by one.
+        let ends: Point = std::array::from_fn(|a| last[a] + to[a] - first[a] - from[a]);
+        let length = contour.length().max(norm(&ends));
+        let fine_rest = (rest / 16.0).max(length / FINEST_FOR_REST);
+        let step =
+            power_of_two_below(COARSEST_STEP.min(length / 1024.0).min(tolerance / 10.0).min(fine_rest));
         if step < length / LARGEST_CONTROL {
             return Err(GeometryError::TooManySpans { line });
         }
-        contour.stretch_to((length / step).round() * step);
-        let [from, to] = [(&start, &first), (&stop, &last)].map(|(counts, p)| self.offset(counts, p));
+        contour.stretch_to((length / step).round().max(1.0) * step);
         contour.shift(&from, &to, &self.metric);
         let mut reach = [f64::INFINITY; MAX_AXES];
         for (reach, axis) in reach.iter_mut().zip(&self.machine.axes) {

@@ -7,7 +7,7 @@ use super::*;
 use crate::geometry::grid_path::GridPath;
 use crate::geometry::section::SpeedCap;
 use crate::job::machine::{AxisKind, CornerMode, Plant, Servo, Unit};
-use crate::job::program::{Arc, Corner, Feed, Move, Shape};
+use crate::job::program::{Arc, Corner, Feed, Move, Shape, ToleranceSource};
 
 fn axis(name: &str, kind: AxisKind, counts_per_unit: f64) -> Axis {
     let limits = AxisLimits { velocity: 150.0, acceleration: 1500.0, jerk: 5e4 };
@@ -44,6 +44,8 @@ fn machine(axes: Vec<Axis>) -> Machine {
         control_tick_s: 1e-3,
         tolerance_mm: 0.01,
         tolerance_rotary: 0.02,
+        best_speed_mm: 0.05,
+        exact_path_mm: 0.001,
         corner: CornerMode::Blend,
         axes,
         home: [0.0; MAX_AXES],
@@ -132,7 +134,7 @@ impl Program {
 
     /// The programmed contour as a fine polyline.
     fn contour(&self) -> Vec<Point> {
-        self.moves().flat_map(|m| sampled(m, 1e-6)).collect()
+        self.moves().flat_map(|m| sampled(m, 1e-5)).collect()
     }
 }
 
@@ -272,7 +274,7 @@ fn examine(program: &Program, machine: &Machine) -> Vec<Section> {
         }
     }
     // Sampled chords and far coordinates are not exact either.
-    let slop = 4e-6 + 1e-13 * size + 1e-3 * bound;
+    let slop = 1.2e-5 + 1e-13 * size + 1e-3 * bound;
     if !whole.is_empty() {
         let there = one_way(&whole, &contour, 1);
         assert!(there <= bound + slop, "path to contour {there}, proven {bound}");
@@ -283,7 +285,11 @@ fn examine(program: &Program, machine: &Machine) -> Vec<Section> {
     found
 }
 
-const FINE: Corner = Corner::Within(0.01);
+const FINE: Corner = within(0.01);
+
+const fn within(tolerance_mm: f64) -> Corner {
+    Corner::Within { tolerance_mm, source: ToleranceSource::Program }
+}
 
 #[test]
 fn a_line_is_one_exact_section() {
@@ -359,7 +365,7 @@ fn exact_corners_reversals_stops_and_rapids_end_sections() {
     p.line(&[10.0, -5.0]).rapid(&[0.0]).rapid(&[5.0]).line(&[6.0]);
     p.items.push(Item::Dwell { seconds: 0.5, line: 90 });
     p.line(&[7.0]);
-    p.corner = Corner::Within(0.0);
+    p.corner = within(0.0);
     p.line(&[8.0]).line(&[8.0, 1.0]);
     p.items.push(Item::Stop { cause: StopCause::ToolChange, line: 91 });
     let machine = mill();
@@ -418,11 +424,11 @@ fn feeds_become_caps_where_they_were_programmed() {
 
 #[test]
 fn each_block_keeps_its_own_tolerance() {
-    let mut p = Program::new(&[0.0], Corner::Within(0.5));
+    let mut p = Program::new(&[0.0], within(0.5));
     p.line(&[20.0]).line(&[20.0, 20.0]);
-    p.corner = Corner::Within(0.002);
+    p.corner = within(0.002);
     p.line(&[40.0, 25.0]).line(&[45.0, 0.0]).line(&[50.0, 20.0]);
-    p.corner = Corner::Within(0.5);
+    p.corner = within(0.5);
     p.line(&[60.0, 20.0]).line(&[65.0, 0.0]);
     let found = examine(&p, &mill());
     assert_eq!(found.len(), 1);
@@ -451,7 +457,7 @@ fn a_cloud_of_micrometre_moves_neither_stalls_nor_explodes() {
 
 #[test]
 fn dense_samples_of_a_curve_take_few_spans() {
-    let mut p = Program::new(&[10.0, 0.0], Corner::Within(0.05));
+    let mut p = Program::new(&[10.0, 0.0], within(0.05));
     for i in 1..=10_000 {
         let a = f64::from(i) * TAU / 5000.0;
         let digits = |x: f64| (x * 1e4).round() / 1e4;
@@ -496,7 +502,7 @@ fn rotary_axes_keep_their_own_tolerance() {
 #[test]
 fn coarse_counts_widen_the_tolerance_to_what_they_allow() {
     let machine = machine(["X", "Y"].map(|n| axis(n, AxisKind::Linear, 100.0)).into());
-    let mut p = Program::new(&[0.0], Corner::Within(0.001));
+    let mut p = Program::new(&[0.0], within(0.001));
     p.line(&[1.234567, 0.2]).line(&[2.0, 2.34567]).arc([0, 1], 1.0, 0.0, 2.0, 0.0);
     let found = p.run(&machine);
     let d = found[0].marks.deviation;
@@ -522,6 +528,31 @@ fn bad_numbers_and_gaps_are_refused() {
     assert!(matches!(first_error(&p), SectionError::Geometry(_)));
 }
 
+#[test]
+fn short_reversals_within_the_tolerance_do_not_stall() {
+    let mut p = Program::new(&[0.0], within(0.05));
+    p.line(&[0.024]).line(&[0.0072]).line(&[0.0118]).line(&[0.0107]);
+    examine(&p, &mill());
+}
+
+#[test]
+fn hostile_numbers_end_in_bounded_time() {
+    let machine = mill();
+    let sizes = [1e-300, 1e-12, 1e-4, 1.0, 1e5, 1e11, 1e300];
+    for tolerance in [1e-300, 1e-9, 1e-3, 1e9] {
+        for size in sizes {
+            for sweep in [1e-12, 3.0, -1e4, 1e12] {
+                let mut p = Program::new(&[0.0], within(tolerance));
+                p.line(&[size, 0.0, 0.0]).arc([0, 1], size, 0.0, sweep, size).line(&[0.0, -size, size]);
+                for item in sections(p.stream(), &machine, &PathSettings::of(&machine)) {
+                    let Ok(SectionItem::Section(s)) = item else { continue };
+                    assert!(s.marks.deviation.bound_mm <= s.marks.deviation.tolerance_mm);
+                }
+            }
+        }
+    }
+}
+
 /// A move relative to the last end.
 #[derive(Clone, Debug)]
 enum Step {
@@ -545,7 +576,7 @@ fn step() -> impl Strategy<Value = Step> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 40, ..ProptestConfig::default() })]
 
     #[test]
     fn any_contour_is_fitted_within_its_tolerance(
@@ -553,7 +584,7 @@ proptest! {
         tolerance in prop_oneof![Just(0.002), Just(0.01), Just(0.05), Just(0.5)],
         origin in prop_oneof![Just(0.0), -100.0..100.0f64, Just(1e6)],
     ) {
-        let mut p = Program::new(&[origin, -origin, 0.5 * origin], Corner::Within(tolerance));
+        let mut p = Program::new(&[origin, -origin, 0.5 * origin], within(tolerance));
         for s in steps {
             let [x, y, z] = [p.at[0], p.at[1], p.at[2]];
             match s {
