@@ -11,5 +11,6 @@ pub mod feed;
 pub mod geometry;
 pub mod job;
 pub mod pipeline;
+pub mod splines;
 pub mod tolerances;
 pub mod topp;

@@ -5,3 +5,4 @@ pub mod machine;
 pub mod machine_error;
 mod machine_file;
 pub mod program;
+pub mod waypoints;
