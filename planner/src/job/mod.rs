@@ -5,4 +5,5 @@ pub mod machine;
 pub mod machine_error;
 mod machine_file;
 pub mod program;
+pub mod samples;
 pub mod waypoints;

@@ -216,7 +216,8 @@ impl<'m> Collector<'m> {
         let mut extent = 0.0;
         for (column, (&axis, weight)) in points.axes.iter().zip(&weights).enumerate() {
             let values = points.values.iter().skip(column).step_by(points.axes.len());
-            let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &v| [l.min(v), h.max(v)]);
+            let [low, high] =
+                values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &v| [l.min(v), h.max(v)]);
             let counts = (high - low) * points.machine.axes[axis].counts_per_unit;
             if counts >= 1.0 {
                 extent = f64::max(extent, (high - low) * weight);

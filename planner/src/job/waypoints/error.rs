@@ -124,15 +124,21 @@ impl WayPointErrorKind {
                 return format!("the machine's axes are {known}; columns are separated by commas");
             }
             K::ColumnTwice { .. } => "keep one column per axis",
-            K::UnknownUnit { .. } => "expected um, mm, cm, m or in for a linear axis, deg or rad for a rotary one",
+            K::UnknownUnit { .. } => {
+                "expected um, mm, cm, m or in for a linear axis, deg or rad for a rotary one"
+            }
             K::UnitOfKind { .. } => "linear axes take um, mm, cm, m or in, rotary axes deg or rad",
             K::Ragged { .. } => "give every way-point one number per axis; the decimal sign is a point",
             K::NotANumber { .. } => "expected a number such as 12.5 or -3e-2; the decimal sign is a point",
             K::NotFinite { .. } => "expected a position inside the travel",
-            K::OutsideTravel { .. } => "positions are machine coordinates: move the way-points inside the travel",
+            K::OutsideTravel { .. } => {
+                "positions are machine coordinates: move the way-points inside the travel"
+            }
             K::Repeated { .. } => "remove one of the two lines; a spline cannot wait",
             K::TooFewPoints { .. } => "add way-points or choose another end condition",
-            K::Standstill => "way-points closer than a drive count are one place for the machine: check the units",
+            K::Standstill => {
+                "way-points closer than a drive count are one place for the machine: check the units"
+            }
             K::NotClosed { .. } => "end with the first way-point again, or choose another end condition",
             K::EndSlope { .. } => "expected a finite slope, in axis units per unit of path length",
             K::Feed { .. } => "expected a positive speed in axis units per second",
@@ -165,7 +171,8 @@ impl WayPointError {
         kind: WayPointErrorKind,
     ) -> Self {
         let shown = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-        let (start, end) = (span.start.min(text.len()), span.end.clamp(span.start, text.len().max(span.start)));
+        let (start, end) =
+            (span.start.min(text.len()), span.end.clamp(span.start, text.len().max(span.start)));
         let offset = shown(&text[..start]).len();
         let length = shown(&text[start..end.max(start).min(text.len())]).len();
         let cell = Cell { name: name.to_owned(), text: shown(text), line, offset, length };

@@ -58,7 +58,13 @@ pub(super) fn section(
     let end = path.grid_length();
     let marks = Marks {
         caps: vec![FeedCap { until: end, speed: feed.map_or(SpeedCap::None, |f| fit.cap(f)) }],
-        blocks: grid.at.iter().zip(&points.lines).skip(1).map(|(&until, &line)| BlockMark { until, line }).collect(),
+        blocks: grid
+            .at
+            .iter()
+            .zip(&points.lines)
+            .skip(1)
+            .map(|(&until, &line)| BlockMark { until, line })
+            .collect(),
         deviation,
         end: StopCause::ProgramEnd,
     };
@@ -158,9 +164,12 @@ impl Fit<'_> {
             .fold(f64::INFINITY, f64::min);
         let bits = |column: usize| {
             let axis = self.axis(column);
-            let noise = (axis.limits.jerk * quickest.powi(3)).min(axis.limits.acceleration * quickest.powi(2));
+            let noise =
+                (axis.limits.jerk * quickest.powi(3)).min(axis.limits.acceleration * quickest.powi(2));
             let wanted = LSB_NOISE * noise / 4.0 * axis.counts_per_unit;
-            (0..MOST_FRACTION_BITS).find(|&f| 1.0 <= wanted * f64::from(1u32 << f)).unwrap_or(MOST_FRACTION_BITS)
+            (0..MOST_FRACTION_BITS)
+                .find(|&f| 1.0 <= wanted * f64::from(1u32 << f))
+                .unwrap_or(MOST_FRACTION_BITS)
         };
         self.columns().map(bits).collect()
     }
@@ -170,7 +179,9 @@ impl Fit<'_> {
         let ends = self.form.ends;
         let system = match CubicSystem::new(grid.lengths(), ends) {
             Ok(system) => system,
-            Err(SplineError::TooFew { found, least }) => return self.fail(Kind::TooFewPoints { found, least }),
+            Err(SplineError::TooFew { found, least }) => {
+                return self.fail(Kind::TooFewPoints { found, least });
+            }
             // Rounded lengths are whole steps: no other error is left.
             Err(_) => return self.fail(Kind::Standstill),
         };
@@ -178,7 +189,8 @@ impl Fit<'_> {
         let mut parts: Vec<u32> = (1..self.points.count()).map(|i| self.first_parts(i)).collect();
         for _ in 0..HALVINGS {
             let breaks = grid.breaks(ends, &parts);
-            let mut axes: Vec<GridAxis> = self.points.machine.axes.iter().map(|a| still(a, &breaks)).collect();
+            let mut axes: Vec<GridAxis> =
+                self.points.machine.axes.iter().map(|a| still(a, &breaks)).collect();
             let mut halve = vec![false; parts.len()];
             for column in self.columns() {
                 let axis = self.axis(column);
@@ -221,7 +233,8 @@ impl Fit<'_> {
     /// Spans that the interval before way-point `i` is divided into at first.
     fn first_parts(&self, i: usize) -> u32 {
         let moves = self.points.row(i).iter().zip(self.points.row(i - 1)).zip(self.columns());
-        let counts = moves.map(|((b, a), c)| (b - a).abs() * self.axis(c).counts_per_unit).fold(0.0, f64::max);
+        let counts =
+            moves.map(|((b, a), c)| (b - a).abs() * self.axis(c).counts_per_unit).fold(0.0, f64::max);
         (counts / FIRST_PART).ceil().max(1.0) as u32
     }
 
@@ -239,7 +252,8 @@ impl Fit<'_> {
                 }
                 if let Some(value) = extremes(bezier).into_iter().find(|&v| outside(v)) {
                     let value = origin + value;
-                    return self.fail_at(b.interval, Kind::Overshoot { axis: axis.name.clone(), value, min, max });
+                    return self
+                        .fail_at(b.interval, Kind::Overshoot { axis: axis.name.clone(), value, min, max });
                 }
             }
         }

@@ -65,7 +65,12 @@ impl Record {
     }
 
     /// Moves on to the next line that is neither blank nor a comment; false at the end of the file.
-    fn next(&mut self, source: &mut impl BufRead, csv: &mut Reader, name: &str) -> Result<bool, WayPointError> {
+    fn next(
+        &mut self,
+        source: &mut impl BufRead,
+        csv: &mut Reader,
+        name: &str,
+    ) -> Result<bool, WayPointError> {
         loop {
             self.raw.clear();
             let read = source.take(LINE_LIMIT_BYTES as u64 + 1).read_until(b'\n', &mut self.raw);
