@@ -105,6 +105,10 @@ impl<'m> WayPoints<'m> {
             let kind = WayPointErrorKind::UnknownAxis { name: axis.to_string(), known: known.join(", ") };
             return Err(WayPointError::of_file(name, kind));
         }
+        if let Some(i) = (1..N).find(|&i| axes[..i].contains(&axes[i])) {
+            let kind = WayPointErrorKind::ColumnTwice { axis: machine.axes[axes[i]].name.clone() };
+            return Err(WayPointError::of_file(name, kind));
+        }
         for (row, line) in rows.into_iter().zip(1..) {
             for (value, axis) in row.iter().zip(axes.iter().map(|&a| &machine.axes[a])) {
                 let [min, max] = axis.travel;
