@@ -91,6 +91,3 @@ pub const LSB_NOISE: f64 = 1e-3;
 /// Below this |dr/du| all along a geometry span the path counts as standing still: the square root of q is
 /// coded with 16 bits, so speeds further apart do not fit one table.
 pub const STALL_SLOPE: f64 = 1e-4;
-
-/// Added to a proven distance from a way-point, relative to its coordinates: covers the rounding of the proof.
-pub const WAY_POINT_ROUNDING: f64 = 32.0 * f64::EPSILON;

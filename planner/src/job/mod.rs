@@ -1,4 +1,4 @@
-//! What a user hands in: machine files and part programs.
+//! What a user hands in: machine files, part programs and way-points.
 
 pub mod gcode;
 pub mod machine;

@@ -181,7 +181,7 @@ pub fn tooth_raster(rows: usize, points: usize) -> Vec<[f64; 3]> {
     let row = |r: usize| {
         let y = place(r, rows);
         (0..points).map(move |k| {
-            let x = place(if r % 2 == 0 { k } else { points - 1 - k }, points);
+            let x = place(if r.is_multiple_of(2) { k } else { points - 1 - k }, points);
             [x, y, tooth_height_mm(x, y)]
         })
     };

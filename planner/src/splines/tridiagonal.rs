@@ -108,16 +108,16 @@ mod tests {
             let mut x = b.clone();
             Tridiagonal::factor(lower.clone(), &diagonal, upper.clone()).solve(&mut x);
             let size = x.iter().fold(1.0f64, |m, v| m.max(v.abs()));
-            for i in 0..n {
-                prop_assert!((row(&x, i) - b[i]).abs() < 1e-12 * size);
+            for (i, right) in b.iter().enumerate() {
+                prop_assert!((row(&x, i) - right).abs() < 1e-12 * size);
             }
 
             let mut x = b.clone();
             Cyclic::factor(lower.clone(), diagonal.clone(), upper.clone(), corner).solve(&mut x);
             let size = x.iter().fold(1.0f64, |m, v| m.max(v.abs()));
-            for i in 0..n {
+            for (i, right) in b.iter().enumerate() {
                 let far = if i == 0 { x[n - 1] } else if i == n - 1 { x[0] } else { 0.0 };
-                prop_assert!((row(&x, i) + corner * far - b[i]).abs() < 1e-11 * size);
+                prop_assert!((row(&x, i) + corner * far - right).abs() < 1e-11 * size);
             }
         }
     }

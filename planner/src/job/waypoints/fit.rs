@@ -8,7 +8,7 @@ use crate::job::machine::{Axis, AxisKind};
 use crate::job::program::{MoveKind, StopCause};
 use crate::splines::cubic::{CubicSystem, Ends, SplineError};
 use crate::splines::grid::{Break, KnotGrid};
-use crate::tolerances::{LSB_NOISE, STALL_SLOPE, WAY_POINT_ROUNDING};
+use crate::tolerances::{DEVIATION_ROUNDING, LSB_NOISE, STALL_SLOPE};
 
 /// Finest division of a drive count is 2^-12.
 const MOST_FRACTION_BITS: u32 = 12;
@@ -52,7 +52,6 @@ pub(super) fn section(
     fit.check_request(feed)?;
     let grid = fit.grid();
     let (path, breaks) = fit.path(&grid)?;
-    fit.check_travel(&path, &breaks)?;
     fit.check_progress(&path, &breaks)?;
     let deviation = fit.deviation(&path, &grid);
     let end = path.grid_length();
@@ -109,7 +108,7 @@ impl Fit<'_> {
             }
             let (start, end) = (self.points.row(0)[column], self.points.row(found - 1)[column]);
             if self.form.ends == Ends::Periodic && ((end - start) * axis.counts_per_unit).abs() > 0.5 {
-                let kind = Kind::NotClosed { axis: axis.name.clone(), start, end };
+                let kind = Kind::NotClosed { axis: axis.name.clone(), start: shown(start), end: shown(end) };
                 return self.fail_at(found - 2, kind);
             }
         }
@@ -174,7 +173,7 @@ impl Fit<'_> {
         self.columns().map(bits).collect()
     }
 
-    /// The rounded path, with spans short enough for the drives' arithmetic.
+    /// The rounded path, inside the travel and with spans short enough for the drives' arithmetic.
     fn path(&self, grid: &KnotGrid) -> Result<(GridPath, Vec<Break>), WayPointError> {
         let ends = self.form.ends;
         let system = match CubicSystem::new(grid.lengths(), ends) {
@@ -211,15 +210,19 @@ impl Fit<'_> {
                 }
                 for (j, w) in controls.windows(2).enumerate() {
                     if w[1].abs_diff(w[0]) as f64 >= CONTROL_STEP * division {
-                        // The step from control point j to the next lies in spans j - 2 to j.
-                        let last = (breaks.len() - 2).min(j);
-                        halve[breaks[j.saturating_sub(2)].interval..=breaks[last].interval].fill(true);
+                        // The step from control point j to the next belongs to spans j - 2 to j.
+                        let [first, end] =
+                            [j.saturating_sub(2), (j + 1).min(breaks.len() - 1)].map(|k| breaks[k]);
+                        let inside = usize::from(end.at > grid.at[end.interval]);
+                        halve[first.interval..end.interval + inside].fill(true);
                     }
                 }
                 axes[index] = GridAxis { lsb: 1.0 / scale, controls };
             }
+            let path = GridPath { step: grid.step, breaks: breaks.iter().map(|b| b.at).collect(), axes };
+            // More knots do not change the curve; inside the travel its slope is bounded, and so are its parts.
+            self.check_travel(&path, &breaks)?;
             if halve.iter().all(|&h| !h) {
-                let path = GridPath { step: grid.step, breaks: breaks.iter().map(|b| b.at).collect(), axes };
                 return Ok((path, breaks));
             }
             for (parts, _) in parts.iter_mut().zip(&halve).filter(|(_, halve)| **halve) {
@@ -251,7 +254,7 @@ impl Fit<'_> {
                     continue;
                 }
                 if let Some(value) = extremes(bezier).into_iter().find(|&v| outside(v)) {
-                    let value = origin + value;
+                    let value = shown(origin + value);
                     return self
                         .fail_at(b.interval, Kind::Overshoot { axis: axis.name.clone(), value, min, max });
                 }
@@ -262,7 +265,7 @@ impl Fit<'_> {
 
     /// In every span the path gets on: one of the Bezier coefficients of r' is not small.
     fn check_progress(&self, path: &GridPath, breaks: &[Break]) -> Result<(), WayPointError> {
-        for span in 0..path.spans() {
+        for (span, start) in breaks.iter().enumerate().take(path.spans()) {
             let mut squares = [0.0; 3];
             for (&index, weight) in self.points.axes.iter().zip(&self.weights) {
                 let (_, b) = path.bezier(index, span);
@@ -273,7 +276,7 @@ impl Fit<'_> {
             let length = (path.breaks[span + 1] - path.breaks[span]) as f64 * path.step;
             let slope = squares.into_iter().fold(0.0, f64::max).sqrt() / length;
             if slope.is_nan() || slope < STALL_SLOPE {
-                return self.fail_at(breaks[span].interval, Kind::Stall { slope });
+                return self.fail_at(start.interval, Kind::Stall { slope });
             }
         }
         Ok(())
@@ -295,7 +298,7 @@ impl Fit<'_> {
                 let piece = path.piece(index, span);
                 let origin = piece.base as f64 * path.axes[index].lsb;
                 let offset = piece.offset(x);
-                let rounding = WAY_POINT_ROUNDING * (wanted.abs() + origin.abs() + offset.abs());
+                let rounding = DEVIATION_ROUNDING * (wanted.abs() + origin.abs() + offset.abs());
                 let miss = (origin - wanted + offset).abs() + rounding;
                 match self.axis(column).kind {
                     AxisKind::Linear => linear += miss * miss,
@@ -344,6 +347,11 @@ fn extremes(b: [f64; 4]) -> [f64; 2] {
         }
     }
     range
+}
+
+/// A position as messages show it.
+fn shown(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
 }
 
 fn power_of_two_below(x: f64) -> f64 {

@@ -1,57 +1,31 @@
 use super::WayPointErrorKind as Kind;
 use super::*;
+use crate::certificate::certify;
 use crate::geometry::grid_path::GridPath;
 use crate::geometry::section::SpeedCap;
-use crate::job::machine::{Axis, AxisLimits, CornerMode, Plant, Servo, Unit};
 use crate::job::program::StopCause;
 use crate::job::samples::{cat_contour, tooth_raster};
+use crate::topp;
+use crate::topp::problem::{Problem, Settings, Solver};
 use miette::Diagnostic;
 use proptest::prelude::*;
 
 const ALL_ENDS: [Ends; 4] = [Ends::NotAKnot, Ends::Clamped, Ends::Natural, Ends::Periodic];
 const ALL_KNOTS: [Knots; 3] = [Knots::Uniform, Knots::Chord, Knots::Centripetal];
 
-fn axis(name: &str, unit: Unit, counts_per_unit: f64) -> Axis {
-    let kind = if unit == Unit::Mm { AxisKind::Linear } else { AxisKind::Rotary };
-    let limits = AxisLimits { velocity: 100.0, acceleration: 500.0, jerk: 10_000.0 };
-    let plant = Plant {
-        inertia: 50.0,
-        viscous: 1.0,
-        coulomb: 1.0,
-        effort_limit: 100.0,
-        encoder_counts_per_count: 1.0,
-        two_mass: None,
-    };
-    let servo = Servo {
-        position_gain: 80.0,
-        velocity_bandwidth: 300.0,
-        integral_time_s: 0.03,
-        velocity_feed_forward: 1.0,
-        acceleration_feed_forward: 1.0,
-    };
-    let travel = [-400.0, 400.0];
-    Axis { name: name.into(), kind, unit, counts_per_unit, travel, limits, rapid: limits, plant, servo }
-}
-
-/// X, Y, Z in mm, A in deg, Q1 in rad.
+/// X, Y, Z in mm, A and Q1 in deg.
 fn machine() -> Machine {
-    Machine {
-        name: "bench".into(),
-        control_tick_s: 1e-3,
-        tolerance_mm: 0.01,
-        tolerance_rotary: 0.01,
-        corner: CornerMode::Blend,
-        axes: vec![
-            axis("X", Unit::Mm, 1000.0),
-            axis("Y", Unit::Mm, 1000.0),
-            axis("Z", Unit::Mm, 1600.0),
-            axis("A", Unit::Deg, 100.0),
-            axis("Q1", Unit::Rad, 1e5),
-        ],
-        home: Point::default(),
-        second_home: Point::default(),
-        tools: Vec::new(),
-    }
+    let axis = |name: &str, unit: &str, counts: u32| {
+        let kind = if unit == "mm" { "linear" } else { "rotary" };
+        format!(
+            "[[axis]]\nname = \"{name}\"\nkind = \"{kind}\"\nunit = \"{unit}\"\ncounts_per_unit = {counts}\n\
+             travel = [-400, 400]\nvelocity = 100\nacceleration = 500\njerk = 10000\n"
+        )
+    };
+    let axes =
+        [("X", "mm", 1000), ("Y", "mm", 1000), ("Z", "mm", 1600), ("A", "deg", 100), ("Q1", "deg", 1000)];
+    let text: String = axes.iter().map(|&(name, unit, counts)| axis(name, unit, counts)).collect();
+    Machine::from_toml(&text, "bench.toml").unwrap()
 }
 
 fn refusal(text: &str) -> WayPointError {
@@ -109,12 +83,12 @@ fn check_section(points: &WayPoints<'_>, section: &Section, periodic: bool) {
 
 #[test]
 fn header_names_axes_in_any_order_case_and_unit() {
-    let text = "\u{feff}# a comment\n\n y (IN) , x,\"A [deg]\",q1 [deg] \r\n1,2,3,180\r\n # more\n\n 1.5 ,+2e1,-.5,\"0\"";
+    let text = "\u{feff}# a comment\n\n y (IN) , x,\"A [deg]\",q1 [rad] \r\n1,2,3,1\r\n # more\n\n 1.5 ,+2e1,-.5,\"0\"";
     let machine = machine();
     let points = read_from(text.as_bytes(), "job.csv", &machine).unwrap();
     assert_eq!(points.count(), 2);
     assert_eq!(points.lines, [4, 7]);
-    assert_eq!(points.point(0)[..5], [2.0, 25.4, 0.0, 3.0, std::f64::consts::PI]);
+    assert_eq!(points.point(0)[..5], [2.0, 25.4, 0.0, 3.0, 180.0 / std::f64::consts::PI]);
     assert_eq!(points.point(1)[..5], [20.0, 1.5 * 25.4, 0.0, -0.5, 0.0]);
 }
 
@@ -339,6 +313,30 @@ fn a_tooth_raster_is_one_section() {
     }
 }
 
+#[test]
+fn sections_can_be_planned_and_certified() {
+    let machine = machine();
+    let limits: Vec<_> = machine.axes.iter().map(|a| a.limits).collect();
+    let settings = Settings { solver: Solver::InteriorPoint, relative_gap: 1e-3, spans_per_ramp: 2.0 };
+    let cat = WayPoints::from_rows(cat_contour(60).unwrap(), [0, 1], "cat", &machine).unwrap();
+    let tooth = WayPoints::from_rows(tooth_raster(4, 25), [0, 1, 2], "tooth", &machine).unwrap();
+    let back = read_from(&b"X,Y\n0,0\n30,40\n0,0\n30,40\n"[..], "there and back", &machine).unwrap();
+    for (points, ends) in [(cat, Ends::Periodic), (tooth, Ends::NotAKnot), (back, Ends::Natural)] {
+        for knots in ALL_KNOTS {
+            let Section { path, marks, .. } = points.section(&form(ends, knots), Some(60.0)).unwrap();
+            let problem = Problem {
+                path: &path,
+                limits: &limits,
+                caps: &marks.caps,
+                shortest_span_s: machine.control_tick_s,
+            };
+            let table = topp::plan(&problem, &settings).unwrap().table;
+            let certificate = certify(&table, &limits, &marks.caps);
+            assert!(certificate.holds, "{knots:?} {certificate:?}");
+        }
+    }
+}
+
 /// Random walks with steps over four decades, in one to three axes.
 fn walks() -> impl Strategy<Value = Vec<[f64; 3]>> {
     let step = (-2.0..2.0f64, prop::array::uniform3(-1.0..1.0f64));
@@ -362,7 +360,9 @@ proptest! {
         ends in prop::sample::select(ALL_ENDS.to_vec()),
         knots in prop::sample::select(ALL_KNOTS.to_vec()),
     ) {
-        let machine = machine();
+        let mut machine = machine();
+        // So fine that spans have to be divided for the drives.
+        machine.axes[1].counts_per_unit = 5e6;
         let mut walk = walk;
         if ends == Ends::Periodic {
             walk.push([0.0; 3]);
@@ -385,6 +385,27 @@ proptest! {
                 prop_assert!(expected, "{error}");
                 let placed = matches!(error.kind(), Kind::TooFewPoints { .. }) || error.line().is_some();
                 prop_assert!(placed, "{error}");
+            }
+        }
+    }
+
+    /// No file makes the reader panic, and what it refuses it can show.
+    #[test]
+    fn any_bytes_are_read_or_refused(
+        header in prop::sample::select(vec!["X,Y", "\"X [mm]\" ,a(rad)", "Y", "Z [", "\u{feff}X"]),
+        body in prop::collection::vec(prop::sample::select(b"0159.,,-e\"\n\n\r# \xff\xc3".to_vec()), 0..80),
+        stray in prop::collection::vec(any::<u8>(), 0..6),
+    ) {
+        let machine = machine();
+        let file = [header.as_bytes(), b"\n", &body, &stray].concat();
+        match read_from(file.as_slice(), "job.csv", &machine) {
+            Ok(points) => prop_assert!(points.values.iter().all(|v| v.abs() <= 400.0) && points.count() >= 2),
+            Err(error) => {
+                prop_assert!(error.help().is_some());
+                if let (Some(source), Some(mut labels)) = (error.source_code(), error.labels()) {
+                    let label = labels.next().unwrap();
+                    prop_assert!(source.read_span(label.inner(), 0, 0).is_ok(), "{error}");
+                }
             }
         }
     }

@@ -133,9 +133,11 @@ proptest! {
             }
             let system = CubicSystem::new(lengths.clone(), ends).unwrap();
             let s = system.interpolate(&values, slopes).unwrap();
+            // Largest terms that a value, a slope or a second derivative is summed from.
             let size = (0..=n).fold([1.0f64; 3], |m, i| {
-                let j = s.at_knot(i);
-                [m[0].max(j.value.abs()), m[1].max(j.slope.abs()), m[2].max(j.second.abs())]
+                let (j, h) = (s.at_knot(i), lengths[i.min(n - 1)]);
+                let [s, v] = [j.slope.abs().max(h * j.second.abs()), j.value.abs()];
+                [m[0].max(v).max(h * s), m[1].max(s), m[2].max(j.second.abs())]
             });
             let close = |a: Jet, b: Jet| {
                 (a.value - b.value).abs() < 1e-11 * size[0]
