@@ -59,7 +59,7 @@ pub struct SplineForm {
 impl Default for SplineForm {
     /// Not-a-knot ends on chord lengths; zero slopes if the ends are then clamped.
     fn default() -> Self {
-        Self { ends: Ends::NotAKnot, knots: Knots::Chord, end_slopes: [[0.0; 9]; 2] }
+        Self { ends: Ends::NotAKnot, knots: Knots::Chord, end_slopes: [Point::default(); 2] }
     }
 }
 
