@@ -84,3 +84,10 @@ pub const ARC_RADIUS_MOST_MM: f64 = 1e7;
 
 /// Feeds up to this are zero [1/min or program units/s]: times and speeds stay finite and positive.
 pub const FEED_LEAST: f64 = 1e-9;
+/// Largest jerk (without jerk limit: acceleration) that rounding the control points of a way-point spline may
+/// add, relative to the limit, on the quickest crossing of a span.
+pub const LSB_NOISE: f64 = 1e-3;
+
+/// Below this |dr/du| all along a geometry span the path counts as standing still: the square root of q is
+/// coded with 16 bits, so speeds further apart do not fit one table.
+pub const STALL_SLOPE: f64 = 1e-4;
