@@ -6,7 +6,6 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::time::Instant;
 
-use miette::Diagnostic;
 use planner::analysis::comparison::Comparison;
 use planner::geometry::sections::{PathSettings, SectionError, sections};
 use planner::job::gcode::{self, Counters, Options, ProgramError};
@@ -16,7 +15,7 @@ use planner::pipeline::{self, JobError, JobPlan, LimitSet};
 use planner::topp::problem::{Settings, Solver};
 
 use crate::args::{self, PlanArgs};
-use crate::failure::{Failure, Place};
+use crate::failure::Failure;
 use crate::progress::Progress;
 
 /// The machine that jobs run on when none is named.
@@ -55,11 +54,12 @@ pub(super) fn plan(args: &PlanArgs, progress: &mut Progress) -> Result<Fitted, F
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
     }
     let machine = match &args.machine {
-        Some(path) => Machine::load(path),
-        None => Machine::from_toml(BUILT_IN, "built-in machine"),
-    }
-    .map_err(|e| diagnosed(&e, e.line(), e.column(), args.machine.as_deref()))?;
-    let refused = |e: ProgramError| diagnosed(&e, e.line(), e.column(), Some(&args.job));
+        Some(path) => Machine::load(path)
+            .map_err(|e| placed(e.kind().to_string(), path, e.line(), e.column()).quoting(e))?,
+        None => Machine::from_toml(BUILT_IN, "built-in machine")
+            .map_err(|e| Failure::internal(format!("the built-in machine is not sound: {e}")))?,
+    };
+    let refused = |e: ProgramError| placed(e.kind().to_string(), &args.job, e.line(), e.column()).quoting(e);
     let mut program = gcode::open(&args.job, &machine, options(args)).map_err(refused)?;
 
     progress.stage("planning");
@@ -84,9 +84,11 @@ pub(super) fn plan(args: &PlanArgs, progress: &mut Progress) -> Result<Fitted, F
     drop(sections);
     let plan = planned.map_err(|e| match e {
         JobError::Section(SectionError::Program(e)) => refused(e),
-        JobError::Section(SectionError::Geometry(e)) => at_line(&args.job, e.line(), &e.to_string())
-            .with_help("Widen the tolerance (G64 P or --tolerance), or change the path at this line."),
-        JobError::Plan { line, fault } => at_line(&args.job, line, &fault.to_string()),
+        JobError::Section(SectionError::Geometry(e)) => {
+            placed(e.to_string(), &args.job, Some(e.line()), None)
+                .with_help("Widen the tolerance (G64 P or --tolerance), or change the path at this line.")
+        }
+        JobError::Plan { line, fault } => placed(fault.to_string(), &args.job, Some(line), None),
     })?;
     let counters = program.counters().clone();
     Ok(Fitted {
@@ -151,47 +153,13 @@ fn settings(args: &PlanArgs) -> Settings {
     Settings { solver, ..Settings::default() }
 }
 
-/// A failure from a diagnostic that already knows its place.
-pub(super) fn diagnosed(
-    error: &dyn Diagnostic,
-    line: Option<u32>,
-    column: Option<u32>,
-    file: Option<&Path>,
-) -> Failure {
-    // Displayed errors start with their place, which the failure shows by itself.
-    let name = file.map_or("built-in machine".into(), |f| f.display().to_string());
-    let text = error.to_string();
-    let message = match (line, column) {
-        (Some(l), Some(c)) => text.strip_prefix(&format!("{name}:{l}:{c}: ")).unwrap_or(&text).to_owned(),
-        _ => text.strip_prefix(&format!("{name}: ")).unwrap_or(&text).to_owned(),
-    };
-    let mut failure = Failure::input(message);
-    if let Some(help) = error.help() {
-        failure = failure.with_help(help.to_string());
-    }
-    let Some(file) = file else { return failure };
+/// Bad input in a file, at a place if that is known.
+fn placed(message: String, file: &Path, line: Option<u32>, column: Option<u32>) -> Failure {
+    let failure = Failure::input(message);
     match (line, column) {
-        (Some(line), Some(column)) => {
-            let width = error.labels().and_then(|mut l| l.next()).map_or(1, |l| l.len());
-            failure.at(file, Place::new(line, column, width, &line_text(file, line)))
-        }
-        _ => failure.in_file(file),
+        (Some(line), column) => failure.at(file, line, column.unwrap_or(1)),
+        (None, _) => failure.in_file(file),
     }
-}
-
-/// Bad input at a line of the program, as a whole.
-fn at_line(file: &Path, line: u32, message: &str) -> Failure {
-    let text = line_text(file, line);
-    let message = message.strip_prefix(&format!("line {line}: ")).unwrap_or(message);
-    Failure::input(message).at(file, Place::new(line, 1, text.len(), &text))
-}
-
-/// The bytes of one line; empty when it cannot be read again.
-fn line_text(file: &Path, line: u32) -> Vec<u8> {
-    let Ok(file) = File::open(file) else { return Vec::new() };
-    let mut lines = BufReader::new(file).split(b'\n');
-    let text = lines.nth(line.max(1) as usize - 1).and_then(Result::ok).unwrap_or_default();
-    text.strip_suffix(b"\r").unwrap_or(&text).to_vec()
 }
 
 /// Lines of a file; zero when it cannot be read.

@@ -94,31 +94,31 @@ pub enum SectionItem {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum GeometryError {
     /// A coordinate, tolerance or feed is not a number, not finite, or a feed is not positive.
-    #[error("line {line}: a number of this move is not finite, or its feed is not positive")]
+    #[error("a number of this move is not finite, or its feed is not positive")]
     NotFinite {
         /// Line of the program.
         line: u32,
     },
     /// A move does not start where the one before it ended.
-    #[error("line {line}: the move does not start where the one before it ended")]
+    #[error("the move does not start where the one before it ended")]
     Gap {
         /// Line of the program.
         line: u32,
     },
     /// A position has too many drive counts to be exact.
-    #[error("line {line}: the position is too far from the origin for exact drive counts")]
+    #[error("the position is too far from the origin for exact drive counts")]
     TooFar {
         /// Line of the program.
         line: u32,
     },
     /// The stretch between two rests takes too many spans.
-    #[error("line {line}: the path from here to the next rest needs too many spans at this tolerance")]
+    #[error("the path from here to the next rest needs too many spans at this tolerance")]
     TooManySpans {
         /// Line of the program.
         line: u32,
     },
     /// The rounded path could not be proven to keep the tolerance.
-    #[error("line {line}: deviation {bound_mm} mm is not proven to be within {tolerance_mm} mm")]
+    #[error("deviation {bound_mm} mm is not proven to be within {tolerance_mm} mm")]
     NotCertified {
         /// Line of the program.
         line: u32,

@@ -265,7 +265,10 @@ fn rest_lengths(problem: &Problem, sweep: &Sweep, ramp_s: f64) -> ([f64; 2], [f6
             jerk = jerk.min(l.jerk / slope);
         }
         let q = sweep.constant[if far { sweep.constant.len() - 1 } else { 0 }];
-        *end = (length.min(0.5 * LONGEST_S * q.sqrt()), jerk);
+        // A cap may be reached before acceleration saturates: half of the speed is then gained at full jerk.
+        let half_ramp = q.sqrt() * (q.sqrt() / jerk).sqrt() / 6.0;
+        let half_ramp = if half_ramp > 0.0 { half_ramp } else { f64::INFINITY };
+        *end = (length.min(0.5 * LONGEST_S * q.sqrt()).min(half_ramp), jerk);
     }
     ([ends[0].0, ends[1].0], [ends[0].1, ends[1].1])
 }
