@@ -275,3 +275,83 @@ pub(super) fn certify(path: &GridPath, contour: &Contour, metric: &Metric) -> Ce
     }
     Certificate { deviation, holds }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ONE: Point = [1.0; MAX_AXES];
+
+    fn metric() -> Metric {
+        Metric {
+            axes: 2,
+            linear: ONE,
+            rotary: [0.0; MAX_AXES],
+            has_rotary: false,
+            tolerance_mm: 0.01,
+            tolerance_rotary: 1.0,
+            tightest: 0.0,
+        }
+    }
+
+    /// A span from (0, 0) to (3, 0) whose second axis is the given Bernstein polynomial.
+    fn span(y: [f64; 4]) -> SpanCurve {
+        let b = std::array::from_fn(|k| {
+            let mut p = [0.0; MAX_AXES];
+            (p[0], p[1]) = (k as f64, y[k]);
+            p
+        });
+        SpanCurve::new(0.0, 3.0, &b, 2)
+    }
+
+    fn line(tolerance: f64) -> Contour {
+        let mut end = [0.0; MAX_AXES];
+        end[0] = 3.0;
+        let (p, length) = Primitive::line(&[0.0; MAX_AXES], &end, tolerance, None, 7);
+        let mut contour = Contour::default();
+        contour.push(p, length);
+        contour
+    }
+
+    #[test]
+    fn a_bulge_is_bounded_by_its_height_not_by_its_control_points() {
+        // 3 t (1 - t) peaks at 3/4 of the control points' height.
+        let curve = span([0.0, 1.0, 1.0, 0.0]);
+        let contour = line(1.0);
+        let bound =
+            piece_bound(&curve, &contour.primitives[0], 0.0, [0.0, 3.0], &metric(), [0.0, 1.0], DEPTH);
+        assert!((0.75..0.75 * (1.0 + DEVIATION_TIGHTNESS)).contains(&bound), "{bound}");
+    }
+
+    #[test]
+    fn within_separates_just_inside_from_just_outside() {
+        let curve = span([0.0, 1.0, 1.0, 0.0]);
+        let height = 0.75 / (1.0 - ROUNDING_SHARE);
+        assert!(within(&curve, &line(height * 1.0001), 0, &metric()));
+        assert!(!within(&curve, &line(height * 0.9999), 0, &metric()));
+    }
+
+    #[test]
+    fn a_chord_of_an_arc_is_off_by_its_sagitta() {
+        use crate::job::program::Arc;
+        let (radius, half) = (1.0, 0.3f64);
+        let arc = Arc {
+            plane: [0, 1],
+            centre: [0.0; 2],
+            radius,
+            radius_change: 0.0,
+            start_angle: -half,
+            sweep: 2.0 * half,
+        };
+        let (mut start, mut end) = ([0.0; MAX_AXES], [0.0; MAX_AXES]);
+        (start[0], start[1]) = (half.cos(), -half.sin());
+        (end[0], end[1]) = (half.cos(), half.sin());
+        let (p, length) = Primitive::arc(&start, &end, &arc, 1.0, None, 1);
+        let b =
+            std::array::from_fn(|k| std::array::from_fn(|a| start[a] + (end[a] - start[a]) * k as f64 / 3.0));
+        let curve = SpanCurve::new(0.0, length, &b, 2);
+        let bound = piece_bound(&curve, &p, 0.0, [0.0, length], &metric(), [0.0, 1.0], DEPTH);
+        let sagitta = radius * (1.0 - half.cos());
+        assert!((sagitta..sagitta * 1.02).contains(&bound), "{bound} for {sagitta}");
+    }
+}

@@ -308,3 +308,78 @@ pub(super) fn angle(a: &Point, b: &Point) -> f64 {
     let sum: Point = std::array::from_fn(|i| a[i] + b[i]);
     2.0 * distance(a, b).atan2(norm(&sum))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(lengths: &[f64]) -> Contour {
+        let mut contour = Contour::default();
+        let mut at = [0.0; MAX_AXES];
+        for &length in lengths {
+            let mut end = at;
+            end[0] += length;
+            let (p, l) = Primitive::line(&at, &end, 0.01, None, 1);
+            contour.push(p, l);
+            at = end;
+        }
+        contour
+    }
+
+    #[test]
+    fn seek_agrees_with_a_linear_search_from_any_hint() {
+        let contour = row(&[1.0, 0.5, 2.0, 0.25, 4.0, 1.0, 1.0]);
+        for i in 0..=100 {
+            let u = contour.length() * f64::from(i) / 100.0;
+            let expected = contour.ends.iter().position(|&e| e > u).unwrap_or(contour.ends.len() - 1);
+            for hint in 0..contour.ends.len() + 2 {
+                assert_eq!(contour.seek(hint, u), expected, "u = {u}, hint {hint}");
+            }
+        }
+    }
+
+    #[test]
+    fn cutting_keeps_positions() {
+        let contour = row(&[1.0, 2.0, 3.0]);
+        let (before, after) = contour.cut(1);
+        assert_eq!(before.last(), after.first());
+        assert_eq!(after.length(), 5.0);
+        assert_eq!(after.position(1, 2.5)[0], 3.5);
+    }
+
+    #[test]
+    fn an_arc_starts_and_ends_where_the_program_says_and_has_unit_speed() {
+        let arc = Arc {
+            plane: [0, 1],
+            centre: [1.0, 1.0],
+            radius: 2.0,
+            radius_change: 0.001,
+            start_angle: 0.5,
+            sweep: -4.0,
+        };
+        let at = |t: f64, z: f64| {
+            let (r, a) = (2.0 + 0.001 * t, 0.5 - 4.0 * t);
+            let mut p = [0.0; MAX_AXES];
+            (p[0], p[1], p[2]) = (1.0 + r * a.cos(), 1.0 + r * a.sin(), z);
+            p
+        };
+        let (start, end) = (at(0.0, 0.0), at(1.0, 3.0));
+        let (p, length) = Primitive::arc(&start, &end, &arc, 0.01, None, 1);
+        assert!(distance(&p.position(0.0), &start) < 1e-12 && distance(&p.position(length), &end) < 1e-12);
+        let step = 1e-4;
+        let speed = distance(&p.position(2.0), &p.position(2.0 + step)) / step;
+        assert!((speed - 1.0).abs() < 1e-3, "{speed}");
+    }
+
+    #[test]
+    fn angles_are_accurate_at_both_ends() {
+        let unit = |a: f64| {
+            let mut p = [0.0; MAX_AXES];
+            (p[0], p[1]) = (a.cos(), a.sin());
+            p
+        };
+        for a in [1e-9, 1.0, std::f64::consts::PI - 1e-9] {
+            assert!((angle(&unit(0.0), &unit(a)) - a).abs() < 1e-15, "{a}");
+        }
+    }
+}

@@ -157,3 +157,36 @@ impl Knots {
         [i - 2, i - 1, i].map(|k| self.clamped(k) as f64 * self.step)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grading_ends_with_neighbours_in_proportion() {
+        let at = vec![0, 4096, 4100, 9000, 9001, 20_000];
+        let corner = vec![false, false, true, false, false, false];
+        let mut knots = Knots { step: 1.0, at, corner };
+        loop {
+            let mut split = vec![false; knots.spans()];
+            knots.grade(&mut split);
+            if !split.contains(&true) {
+                break;
+            }
+            knots.halve(&split);
+        }
+        for i in 1..knots.spans() {
+            let (a, b) = (knots.length(i - 1) as f64, knots.length(i) as f64);
+            let limit = if knots.corner[i] { SYMMETRY } else { GRADING };
+            assert!(a.max(b) <= limit * a.min(b), "{a} beside {b}");
+        }
+        assert!(knots.at.contains(&4100) && knots.at.contains(&9001));
+    }
+
+    #[test]
+    fn halving_reports_where_each_knot_comes_from() {
+        let mut knots = Knots { step: 1.0, at: vec![0, 10, 30], corner: vec![false, true, false] };
+        assert_eq!(knots.halve(&[false, true]), [Some(0), Some(1), None, Some(2)]);
+        assert_eq!((knots.at, knots.corner), (vec![0, 10, 20, 30], vec![false, true, false, false]));
+    }
+}

@@ -255,6 +255,14 @@ fn examine(program: &Program, machine: &Machine) -> Vec<Section> {
             assert_eq!(&counts(0), at, "starts where the last one ended");
         }
         at = Some(counts(s.path.spans() + 2));
+        for (g, axis) in s.path.axes.iter().zip(&machine.axes) {
+            let fraction_bits = -(g.lsb * axis.counts_per_unit).log2().round();
+            assert!((0.0..=f64::from(rules::MAX_FRACTION_BITS)).contains(&fraction_bits));
+            let furthest = rules::MAX_CONTROL_STEP << fraction_bits as u32;
+            assert!(g.controls.windows(2).all(|c| (c[1] - c[0]).abs() < furthest));
+        }
+        assert!(rules::STEP_EXPONENT.contains(&(s.path.step.log2() as i8)));
+        assert!(s.path.breaks.windows(2).all(|w| w[1] - w[0] < u64::from(rules::MAX_GEOMETRY_LENGTH)));
         for span in 0..s.path.spans() {
             let pieces: Vec<_> = (0..s.path.axes.len()).map(|a| s.path.piece(a, span)).collect();
             for i in 0..=20 {
