@@ -83,9 +83,7 @@ fn constant(rows: &RowSource, s: usize, pieces: &mut Pieces) -> (f64, f64) {
             d.iter().enumerate().filter(|(a, _)| mask >> a & 1 == 1).map(|(_, d)| d.first_max().powi(2)).sum();
         q = q.min(speed * speed / square);
     }
-    if problem.shortest_span_s > 0.0 {
-        q = q.min((layout.h[i] / problem.shortest_span_s).powi(2));
-    }
+    q = q.min(rows.shortest_bound(s, pieces) * rows.unit);
     (q / rows.unit, slope / rows.unit)
 }
 
