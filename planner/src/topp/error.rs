@@ -84,6 +84,17 @@ pub enum PlanError {
         /// Least length [grid steps].
         needed: u64,
     },
+    /// The motion would need more spans than fit in memory.
+    #[error(
+        "the motion takes about {seconds} s and {spans} table spans, too many for one section: raise the speed cap or \
+         divide the section by a stop"
+    )]
+    TooLong {
+        /// Expected duration [s].
+        seconds: f64,
+        /// Expected spans.
+        spans: f64,
+    },
     /// No axis moves.
     #[error("no axis moves on the path: leave the move out")]
     NothingMoves,

@@ -1,11 +1,13 @@
 //! Where the q knots go: at every geometry knot, dense in time where the speed changes, graded away from rests.
 
 use super::error::PlanError;
-use super::layout::{Layout, Pieces};
+use super::layout::{Derivatives, Layout, Pieces};
 use super::problem::{Problem, Settings};
+use super::rounding;
 use super::sweep::Sweep;
 use crate::feed::table::MIN_SPANS;
 use crate::geometry::grid_path::GridPath;
+use crate::job::machine::AxisLimits;
 
 /// Spans next to each other grow by at most this away from a rest.
 const GROWTH: f64 = 1.8;
@@ -17,6 +19,8 @@ const FEWEST_SPANS: f64 = 32.0;
 const FEWEST_ALL_JERK: f64 = 64.0;
 /// Longest step of a table [grid steps].
 const LONGEST_STEP: f64 = (1u64 << 31) as f64;
+/// Most spans of one table: beyond, memory would not do.
+const MOST_SPANS: f64 = 2e7;
 /// Inner spans next to a rest, and the cells each of them gets.
 const REST_SPANS: usize = 4;
 const REST_CELLS: u8 = 4;
@@ -29,12 +33,17 @@ pub(super) fn place(problem: &Problem, settings: &Settings, sweep: &Sweep) -> Re
         return Err(PlanError::TooShort { steps: total, needed: MIN_SPANS as u64 });
     }
     let estimate = Estimate::new(problem, settings, sweep);
+    let (spans, seconds) =
+        (estimate.count[estimate.count.len() - 1], estimate.clock[estimate.clock.len() - 1]);
+    if spans.is_nan() || spans > MOST_SPANS {
+        return Err(PlanError::TooLong { seconds, spans });
+    }
     let hard = hard_breaks(problem, &estimate);
     let mut knots = vec![0];
     for (pair, index) in hard.windows(2).zip(0..) {
         let (a, b) = (pair[0], pair[1]);
         let rest = index == 0 || index + 2 == hard.len();
-        let pieces = if rest { 1 } else { estimate.pieces(a, b, problem.shortest_span_s) };
+        let pieces = if rest { 1 } else { estimate.pieces(a, b) };
         estimate.divide(a, b, pieces, &mut knots);
     }
     while knots.len() <= MIN_SPANS {
@@ -125,6 +134,11 @@ fn bisect_longest_inner(knots: &mut Vec<u64>) {
 #[derive(Debug)]
 struct Estimate<'a> {
     path: &'a GridPath,
+    limits: &'a [AxisLimits],
+    /// Control tick [s].
+    tick: f64,
+    /// Largest du/dt of the sweep.
+    top: f64,
     stations: &'a [f64],
     /// Spans from the start of the path to each station.
     count: Vec<f64>,
@@ -180,7 +194,9 @@ impl<'a> Estimate<'a> {
             let h = wanted.min(graded * from_start.min(from_end)).min(LONGEST_STEP * path.step);
             count.push(count[k - 1] + (u[k] - u[k - 1]) / h);
         }
-        Estimate { path, stations: u, count, clock, rest, ramp_s }
+        let top = sweep.top().sqrt();
+        let (limits, tick) = (problem.limits, problem.shortest_span_s);
+        Estimate { path, limits, tick, top, stations: u, count, clock, rest, ramp_s }
     }
 
     /// Value at grid step `at` of a quantity given at the stations.
@@ -189,6 +205,22 @@ impl<'a> Estimate<'a> {
         let k = self.stations.partition_point(|&s| s <= u).clamp(1, self.stations.len() - 1);
         let (a, b) = (self.stations[k - 1], self.stations[k]);
         values[k - 1] + (values[k] - values[k - 1]) * ((u - a) / (b - a)).clamp(0.0, 1.0)
+    }
+
+    /// Shortest time a span in the geometry span at grid step `a` should take: clear of the control tick, and long
+    /// enough for the rounding of q to stay a small share of the limits.
+    fn shortest_s(&self, a: u64) -> f64 {
+        const CLEAR: f64 = 1.3;
+        const ROUNDING_SHARE: f64 = 0.04;
+        let path = self.path;
+        let g = path.breaks.partition_point(|&b| b <= a).clamp(1, path.spans()) - 1;
+        let mut noise: f64 = 0.0;
+        for (axis, l) in self.limits.iter().enumerate() {
+            let piece = path.piece(axis, g);
+            let slope = Derivatives::of(&piece, 0.0, piece.length).first_max();
+            noise = noise.max(rounding::shortest_s(slope, l, self.top, ROUNDING_SHARE));
+        }
+        noise.max(CLEAR * self.tick)
     }
 
     fn time(&self, a: u64, b: u64) -> f64 {
@@ -202,9 +234,10 @@ impl<'a> Estimate<'a> {
         (self.stations[k] - self.stations[k - 1]) / (self.count[k] - self.count[k - 1])
     }
 
-    fn pieces(&self, a: u64, b: u64, shortest_s: f64) -> u64 {
+    /// Pieces for the part [a, b] of one geometry span.
+    fn pieces(&self, a: u64, b: u64) -> u64 {
         let wanted = (self.at(&self.count, b) - self.at(&self.count, a) - 1e-6).ceil().max(1.0);
-        let most = if shortest_s > 0.0 { self.time(a, b) / (1.3 * shortest_s) } else { f64::INFINITY };
+        let most = self.time(a, b) / self.shortest_s(a);
         (wanted.min(most.max(1.0)) as u64).clamp(1, b - a)
     }
 
@@ -223,22 +256,17 @@ impl<'a> Estimate<'a> {
     }
 }
 
-/// Shortest time in which a moving axis builds up its acceleration; without jerk limits, a share of its speed ramp.
+/// The time scale of speed changes: what the quickest axis needs to build up its acceleration, but no less than a
+/// share of what it needs to gain its speed: a jerk limit that hardly matters asks for no finer knots.
 fn ramp(problem: &Problem, sweep: &Sweep) -> f64 {
-    const SPEED_RAMP_SHARE: f64 = 0.1;
-    let moving = problem.path.axes.iter().map(|a| a.controls.windows(2).any(|w| w[0] != w[1]));
+    const SPEED_RAMP_SHARE: f64 = 0.08;
+    let top = sweep.top_speeds(problem);
     let ramp = problem
         .limits
         .iter()
-        .zip(moving)
-        .filter(|(_, moving)| *moving)
-        .map(|(l, _)| {
-            if l.jerk.is_finite() {
-                l.acceleration / l.jerk
-            } else {
-                SPEED_RAMP_SHARE * l.velocity / l.acceleration
-            }
-        })
+        .zip(top)
+        .filter(|(_, top)| *top > 0.0)
+        .map(|(l, top)| (l.acceleration / l.jerk).max(SPEED_RAMP_SHARE * top / l.acceleration))
         .fold(f64::INFINITY, f64::min);
     let swept = sweep.duration();
     if ramp.is_finite() { ramp.max(problem.shortest_span_s).max(1e-6 * swept) } else { 0.1 * swept }
@@ -257,10 +285,9 @@ fn rest_lengths(problem: &Problem, sweep: &Sweep, ramp_s: f64) -> ([f64; 2], [f6
             if slope == 0.0 {
                 continue;
             }
-            // Acceleration saturates exactly at the joint: A^3/(6 J^2 |p'|) = A T^2/(6 |p'|) with T = A/J; without
-            // a jerk limit T is two ticks, or a small share of the ramp.
-            let t = if l.jerk.is_finite() { l.acceleration / l.jerk } else { 0.05 * ramp_s };
-            let t = t.max(2.0 * problem.shortest_span_s);
+            // Acceleration saturates exactly at the joint: A^3/(6 J^2 |p'|) = A T^2/(6 |p'|) with T = A/J; where
+            // jerk hardly matters, T is two ticks or a small share of the ramp.
+            let t = (l.acceleration / l.jerk).max(0.05 * ramp_s).max(2.0 * problem.shortest_span_s);
             length = length.min(l.acceleration * t * t / (6.0 * slope));
             jerk = jerk.min(l.jerk / slope);
         }

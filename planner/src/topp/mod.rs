@@ -52,18 +52,6 @@ pub fn plan(problem: &Problem, settings: &Settings) -> Result<Plan, PlanError> {
     let mut iterations = 0;
     for _ in 0..MOST_REFINEMENTS {
         let plan = solve(problem, settings, &sweep, &layout, &mut iterations)?;
-        if std::env::var("DBG").is_ok() {
-            for i in 0..plan.table.spans() {
-                println!(
-                    "{i} h {:.3e} {:?} T {:.3e} {:?}",
-                    layout.h[i],
-                    plan.table.law(i),
-                    plan.table.law(i).duration(),
-                    plan.binding[i]
-                );
-            }
-            println!();
-        }
         let Some(parts) = check::format(&layout, &plan.table) else {
             return Ok(Plan { iterations, ..plan });
         };
@@ -124,7 +112,7 @@ fn solve(
     layout: &Layout,
     iterations: &mut u64,
 ) -> Result<Plan, PlanError> {
-    let unit = sweep.q.iter().copied().fold(0.0, f64::max);
+    let unit = sweep.top();
     let mut source = RowSource {
         problem: *problem,
         layout,

@@ -1,9 +1,10 @@
 //! Rounding the control values to the table's codes, and what it may change.
 
-use super::layout::Layout;
+use super::layout::{Layout, Pieces};
 use super::rows::RowSource;
 use super::sweep::Sweep;
 use crate::feed::table::FeedTable;
+use crate::job::machine::AxisLimits;
 
 /// Largest code of a table.
 const LARGEST_CODE: f64 = 65535.0;
@@ -15,6 +16,15 @@ pub(super) fn scale(unit: f64, ceiling: f64) -> f32 {
     let exact = unit * ceiling / (LARGEST_CODE * LARGEST_CODE);
     let single = exact as f32;
     if f64::from(single) < exact { single.next_up() } else { single }
+}
+
+/// Shortest crossing time of a span in which rounding takes at most `share` of an axis' limits.
+///
+/// With c off by half a code, sqrt(c s), jerk is off by 2 |p'| top/(65535 J T^2) and acceleration by
+/// |p'| top/(65535 A T), both relative to their limits and alike at any speed; `top` is the du/dt of the largest code.
+pub(super) fn shortest_s(slope: f64, limits: &AxisLimits, top: f64, share: f64) -> f64 {
+    let unit = slope * top / (LARGEST_CODE * share);
+    (2.0 * unit / limits.jerk).sqrt().max(unit / limits.acceleration)
 }
 
 /// Bounds on the change of each control value of x by rounding.
@@ -33,11 +43,12 @@ pub(super) fn halves(rows: &RowSource, scale: f32, sweep: &Sweep) -> Vec<f64> {
         .map(|i| sweep.largest(layout.start(path, i), layout.start(path, i + 1), &mut hint) / rows.unit)
         .collect();
     let fold = rows.fold();
+    let mut pieces = Pieces::new(path);
     (0..m)
         .map(|j| {
             let i = j + 1;
             let bound = swept[i - 1].max(swept[i]).max(swept[i + 1]);
-            let c = (HEADROOM * bound).min(rows.ceiling);
+            let c = (HEADROOM * bound).min(rows.ceiling).min(rows.shortest_bound(j, &mut pieces));
             if j == 0 {
                 fold[0] * (2.0 * (rows.joint[0] * s).sqrt() + s + SINGLE * rows.joint[0])
             } else if j + 1 == m {

@@ -10,6 +10,7 @@
 
 use super::layout::{Derivatives, Layout, Pieces, Strictest, strictest};
 use super::problem::Problem;
+use super::rounding;
 use crate::job::machine::MAX_AXES;
 
 /// What a row stands for.
@@ -167,13 +168,34 @@ impl RowSource<'_> {
             let k = self.unit / (caps.rate * caps.rate);
             out.upper.extend(x.iter().map(|b| (b.map(|v| v * k), Source::Feed)));
         }
-        let tick = self.problem.shortest_span_s;
-        let h = self.layout.h[s + 1];
-        // q <= (h/tick)^2 all over the span keeps it as long as a tick; needed only where x = ceiling is too fast.
-        if tick > 0.0 && h * h < tick * tick * self.unit * self.ceiling {
-            let k = self.unit * (tick / h).powi(2);
-            out.upper.extend(x.iter().map(|b| (b.map(|v| v * k), Source::Format)));
+        // q <= (h/T)^2 all over the span keeps it as long as T; needed only where x = ceiling is too fast.
+        let bound = self.longest_enough(s, axes);
+        if bound < self.ceiling {
+            out.upper.extend(x.iter().map(|b| (b.map(|v| v / bound), Source::Format)));
         }
+    }
+
+    /// Largest x on inner span `s` at which the span is as long as it must be: a control tick, and what rounding needs.
+    fn longest_enough(&self, s: usize, axes: &[Derivatives]) -> f64 {
+        const ROUNDING_SHARE: f64 = 0.2;
+        let top = (self.unit * self.ceiling).sqrt();
+        let shortest =
+            axes.iter().zip(self.problem.limits).fold(self.problem.shortest_span_s, |t, (d, l)| {
+                rounding::shortest_s(d.first_max(), l, top, ROUNDING_SHARE).max(t)
+            });
+        (self.layout.h[s + 1] / shortest).powi(2) / self.unit
+    }
+
+    /// The same over the whole span.
+    pub(super) fn shortest_bound(&self, s: usize, pieces: &mut Pieces) -> f64 {
+        let layout = self.layout;
+        let g = layout.geometry[s + 1] as usize;
+        let path = self.problem.path;
+        let offset = (layout.knots[s + 1] - path.breaks[g]) as f64 * path.step;
+        let mut d = [Derivatives::default(); MAX_AXES];
+        let axes = pieces.at(g);
+        d.iter_mut().zip(axes).for_each(|(d, p)| *d = Derivatives::of(p, offset, layout.h[s + 1]));
+        self.longest_enough(s, &d[..axes.len()])
     }
 
     fn joints(&self, s: usize, out: &mut CellRows) {

@@ -87,9 +87,7 @@ fn constant(rows: &RowSource, s: usize, pieces: &mut Pieces) -> (f64, f64) {
             .sum();
         q = q.min(speed * speed / square);
     }
-    if problem.shortest_span_s > 0.0 {
-        q = q.min((layout.h[i] / problem.shortest_span_s).powi(2));
-    }
+    q = q.min(rows.shortest_bound(s, pieces) * rows.unit);
     (q / rows.unit, slope / rows.unit)
 }
 

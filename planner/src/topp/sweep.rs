@@ -100,6 +100,32 @@ impl Sweep {
             .sum()
     }
 
+    /// The q that speeds are measured by: the largest, but no more than a hundred times the mean speed squared.
+    ///
+    /// Where all axes nearly stand still, du/dt is all but free; without this bound such a place would use up the
+    /// range of the codes. Travelling faster could save at most a hundredth of the time.
+    pub(super) fn top(&self) -> f64 {
+        const OVER_MEAN: f64 = 100.0;
+        let mean = self.stations[self.stations.len() - 1] / self.duration();
+        self.q.iter().copied().fold(0.0, f64::max).min((OVER_MEAN * mean).powi(2))
+    }
+
+    /// Largest speed of each axis in the swept motion.
+    pub(super) fn top_speeds(&self, problem: &Problem) -> [f64; MAX_AXES] {
+        let path = problem.path;
+        let per_span = (self.stations.len() - 1) / path.spans();
+        let mut top = [0.0; MAX_AXES];
+        let mut pieces = Pieces::new(path);
+        for (k, (&u, &q)) in self.stations.iter().zip(&self.q).enumerate() {
+            let g = (k / per_span).min(path.spans() - 1);
+            let x = u - path.breaks[g] as f64 * path.step;
+            for (top, piece) in top.iter_mut().zip(pieces.at(g)) {
+                *top = (piece.first(x).abs() * q.sqrt()).max(*top);
+            }
+        }
+        top
+    }
+
     /// Largest q on [from, to], the bracketing stations included; `hint` is an index into the stations at or before
     /// `from`, and is moved on.
     pub(super) fn largest(&self, from: f64, to: f64, hint: &mut usize) -> f64 {

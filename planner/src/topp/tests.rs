@@ -93,3 +93,102 @@ fn exp_walks() {
     let path = circle(0.05, 3.0, 36);
     planned("circle small", &path, &limits(2, 100.0, 500.0, 1e4), &[]);
 }
+#[test]
+fn exp_big() {
+    let mut rng = Rng::new(1);
+    for (axes, spans) in [(3, 140), (3, 13_500), (7, 140), (3, 1350)] {
+        let path = walk(&mut rng, axes, spans, 8.0, 0.5);
+        let l = limits(axes, 100.0, 500.0, 1e4);
+        let problem = Problem { path: &path, limits: &l, caps: &[], shortest_span_s: 1e-3 };
+        for _ in 0..2 {
+            let before = std::time::Instant::now();
+            let p = plan(&problem, &settings()).unwrap();
+            let took = before.elapsed().as_secs_f64();
+            println!(
+                "{axes} axes: {} spans T {} it {} took {took:.4} {:.2} us/span",
+                p.table.spans(),
+                p.table.duration(),
+                p.iterations,
+                1e6 * took / p.table.spans() as f64
+            );
+        }
+    }
+}
+#[test]
+fn exp_clarabel() {
+    let mut rng = Rng::new(1);
+    for (axes, spans, turn) in [(2, 20, 0.5), (3, 40, 0.5), (7, 20, 0.5), (3, 40, 1.5), (1, 5, 0.1)] {
+        let path = walk(&mut rng, axes, spans, 8.0, turn);
+        let l = limits(axes, 100.0, 500.0, 1e4);
+        let problem = Problem { path: &path, limits: &l, caps: &[], shortest_span_s: 1e-3 };
+        let p = plan(&problem, &Settings { relative_gap: 1e-6, ..settings() }).unwrap();
+        let before = std::time::Instant::now();
+        let c =
+            plan(&problem, &Settings { solver: Solver::Clarabel, relative_gap: 1e-6, ..settings() }).unwrap();
+        println!(
+            "{} {} {} {} {} took {:.3}",
+            p.table.spans(),
+            p.table.duration(),
+            c.table.duration(),
+            p.iterations,
+            c.iterations,
+            before.elapsed().as_secs_f64()
+        );
+    }
+}
+#[test]
+fn exp_random() {
+    let from: u64 = std::env::var("SEED").map_or(0, |s| s.parse().unwrap());
+    for seed in from..from + 400 {
+        let mut rng = Rng::new(seed);
+        let axes = 1 + (rng.unit() * 9.0) as usize;
+        let scale = 10f64.powf(rng.within(-3.0, 3.0));
+        let spans = 1 + (rng.unit() * 40.0) as usize;
+        let turn = 10f64.powf(rng.within(-2.0, 0.7));
+        let path = walk(&mut rng, axes, spans, scale, turn);
+        let l: Vec<AxisLimits> = (0..axes)
+            .map(|_| AxisLimits {
+                velocity: 10f64.powf(rng.within(-1.0, 4.0)),
+                acceleration: 10f64.powf(rng.within(0.0, 5.0)),
+                jerk: 10f64.powf(rng.within(1.0, 7.0)),
+            })
+            .collect();
+        let problem = Problem { path: &path, limits: &l, caps: &[], shortest_span_s: 1e-3 };
+        if std::env::var("SAY").is_ok() {
+            println!(
+                "{seed}: axes {axes} scale {scale} spans {spans} turn {turn} {l:?} sweep {}",
+                Sweep::new(&problem).duration()
+            );
+        }
+        if Sweep::new(&problem).duration() > 60.0 {
+            println!("{seed} skipped");
+            continue;
+        }
+        let before = std::time::Instant::now();
+        match plan(&problem, &settings()) {
+            Err(e) => println!("{seed}: {e}"),
+            Ok(p) => {
+                let o = Oracle::of(&problem, &p.table);
+                let took = before.elapsed().as_secs_f64();
+                let bad = o.velocity.max(o.acceleration).max(o.jerk) > 1.0 + 1e-6
+                    || o.curved > 0.25
+                    || o.longest_s >= 1.0
+                    || o.shortest_s < 0.999e-3;
+                let sw = Sweep::new(&problem).duration();
+                if bad
+                    || p.table.spans() > 20000
+                    || took > 0.5
+                    || p.table.duration() < 0.995 * sw
+                    || p.table.duration() > 4.0 * sw
+                {
+                    println!(
+                        "{seed}: {} spans T {} sweep {sw} it {} took {took:.4} {o:?}",
+                        p.table.spans(),
+                        p.table.duration(),
+                        p.iterations
+                    );
+                }
+            }
+        }
+    }
+}
