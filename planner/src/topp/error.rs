@@ -177,6 +177,7 @@ impl PlanError {
             | PlanError::CapOrder { .. }
             | PlanError::Path { .. }
             | PlanError::TooShort { .. }
+            | PlanError::TooLong { .. }
             | PlanError::NothingMoves
             | PlanError::Setting { .. }
             | PlanError::Solver => None,
