@@ -7,12 +7,12 @@ use cli::local::Local;
 use serde_json::Value;
 
 const PROGRAM: &str = "G21 G90 G94 G64 P0.02\n\
-                       (first)\n\
+                       (MSG, first)\n\
                        G0 X5 Y5 Z2\n\
                        G1 Z0 F600\n\
                        G1 X40 F3000\n\
                        Y20\n\
-                       (second)\n\
+                       (MSG, second)\n\
                        G3 X30 Y30 R10\n\
                        G1 X5\n\
                        G4 P0.25\n\
