@@ -34,8 +34,9 @@ pub const CONTOUR_GAP: f64 = 1e-6;
 /// The certificate halves a span until its bound is no further above a ratio that is surely attained.
 pub const CERTIFICATE_TIGHTNESS: f64 = 1e-3;
 
-/// A limit rules where its ratio is within this of one.
-pub const BINDING: f64 = 0.01;
+/// A limit rules a span where its ratio comes within this of one: a quadratic q and its rounding leave most peaks of
+/// jerk a few percent below the limit that bends them.
+pub const BINDING: f64 = 0.05;
 
 /// The programmed feed counts as reached from this share of it on.
 pub const FEED_REACHED: f64 = 0.99;

@@ -249,7 +249,9 @@ fn notes(fitted: &Fitted) -> Vec<NoteJson> {
         JobItem::Note { text, line } => Some(NoteJson { line: *line, text: text.clone() }),
         JobItem::Section(_) | JobItem::Dwell { .. } => None,
     };
-    fitted.plan.items.iter().filter_map(note).collect()
+    let mut notes: Vec<NoteJson> = fitted.plan.items.iter().filter_map(note).collect();
+    notes.sort_by_key(|note| note.line);
+    notes
 }
 
 fn report(

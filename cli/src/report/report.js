@@ -86,7 +86,11 @@
 
   // Everything over time shares one window, everything shares one cursor.
   const whole = T.time.length ? [T.time[0], Math.max(span(P.time)[1], T.time[T.time.length - 1])] : [0, 1];
-  const far = [0, T.pos.length ? T.pos[T.pos.length - 1] : 1];
+  // The phase plot leaves rapids out, unless there is nothing else: they are many times faster and tell little.
+  const cuts = T.mode.some(m => m === 1), phased = i => !cuts || (T.mode[i] === 1 && T.mode[i + 1] !== 2);
+  T.way = new Float64Array(T.pos.length);
+  for (let i = 1; i < T.way.length; i++) T.way[i] = T.way[i - 1] + (phased(i - 1) ? T.pos[i] - T.pos[i - 1] : 0);
+  const far = [0, T.way[T.way.length - 1] || 1];
   let view = whole.slice(), reach = far.slice();
   const plots = [], pictures = [];
 
@@ -97,7 +101,7 @@
       this.kind = figure.dataset.plot;
       this.overPath = this.kind === "phase";
       this.axis = figure.dataset.axis === undefined ? null : D.axes[+figure.dataset.axis];
-      this.x = this.overPath ? T.pos : T.time;
+      this.x = this.overPath ? T.way : T.time;
       if (this.axis) this.band = T.axes[+figure.dataset.axis][this.kind];
       else if (this.kind !== "strip") this.band = T.speed;
       this.unit = figure.querySelector(".dim")?.textContent ?? "";
@@ -130,9 +134,11 @@
       if (!this.axis || this.kind === "e") return null;
       return this.kind === "f" ? this.axis.f : this.axis[this.kind][T.mode[i] === 2 ? 1 : 0];
     }
+    hidden(i) { return this.overPath && !phased(i); }
     range(a, b) {
       let lo = 0, hi = 0;
       for (let i = a; i <= b; i++) {
+        if (this.hidden(i)) continue;
         if (this.band.lo[i] < lo) lo = this.band.lo[i];
         if (this.band.hi[i] > hi) hi = this.band.hi[i];
         const limit = this.limits(i);
@@ -159,18 +165,11 @@
         g.beginPath(); g.moveTo(x, this.top); g.lineTo(x, h - this.bottom); g.stroke();
       }
       if (this.kind === "strip") {
-        for (let i = a, from = a; i <= b && this.x.length; i++) {
-          if (i < b && T.limit[i + 1] === T.limit[from]) continue;
-          g.fillStyle = D.legend[T.limit[from]].colour;
-          const left = Math.max(sx(this.x[from]), this.left);
-          const end = i < b ? Math.min(sx(this.x[i + 1]), w - this.right) : w - this.right;
-          g.fillRect(left, this.top, Math.max(end - left, 0.5), high);
-          from = i + 1;
-        }
+        this.columns(g, sx, a, b, wide, high);
         return;
       }
       const [y0, y1] = this.range(a, b), sy = v => this.top + (y1 - v) / (y1 - y0) * high;
-      const yt = ticks(y0, y1, high / 30);
+      const yt = ticks(y0, y1, high / 24);
       Object.assign(g, { textAlign: "right", textBaseline: "middle" });
       for (const v of yt.at) {
         const y = Math.round(sy(v)) + 0.5;
@@ -181,30 +180,66 @@
       g.save();
       g.beginPath(); g.rect(this.left, this.top - 1, wide, high + 2); g.clip();
       Object.assign(g, { lineJoin: "round", lineWidth: 1.3, strokeStyle: this.axis ? this.axis.colour : css("--trace") });
+      if (!this.axis) this.shade(g, sx, sy, a, b);
       g.beginPath();
-      for (let i = a; i <= b; i++) {
+      for (let i = a, pen = false; i <= b; i++) {
+        if (this.hidden(i)) { pen = false; continue; }
         const x = sx(this.x[i]), lo = this.band.lo[i], hi = this.band.hi[i];
-        g.lineTo(x, sy(hi));
+        if (pen) g.lineTo(x, sy(hi)); else g.moveTo(x, sy(hi));
+        pen = true;
         if (hi !== lo) g.lineTo(x, sy(lo));
       }
       g.stroke();
       Object.assign(g, { strokeStyle: css("--limit"), lineWidth: 1 });
       g.setLineDash([5, 4]);
-      for (const sign of this.axis ? [1, -1] : [1]) {
+      for (const sign of this.axis ? [1, -1] : []) {
         g.beginPath();
         let before = null;
         for (let i = a; i <= b; i++) {
-          const limit = this.axis ? this.limits(i) : T.ceiling[i];
-          if (limit === null || Number.isNaN(limit)) { before = null; continue; }
+          const limit = this.limits(i);
+          if (limit === null) { before = null; continue; }
           const x = sx(this.x[i]), y = sy(sign * limit);
           if (before === null) g.moveTo(Math.max(x, this.left), y);
-          else if (!this.axis) g.lineTo(x, y);
           else if (y !== before) { g.lineTo(x, before); g.lineTo(x, y); } else if (i === b) g.lineTo(x, y);
           before = y;
         }
         g.stroke();
       }
       g.restore();
+    }
+    // The speed that feed and axis velocities allow.
+    shade(g, sx, sy, a, b) {
+      g.save();
+      Object.assign(g, { fillStyle: css("--limit"), globalAlpha: 0.16 });
+      g.beginPath();
+      g.moveTo(sx(this.x[a]), sy(0));
+      for (let i = a; i < b; i++) {
+        if (this.overPath && this.x[i] === this.x[i + 1]) continue;
+        const y = sy(this.hidden(i) || Number.isNaN(T.ceiling[i]) ? 0 : T.ceiling[i]);
+        g.lineTo(sx(this.x[i]), y);
+        g.lineTo(sx(this.x[i + 1]), y);
+      }
+      g.lineTo(sx(this.x[b]), sy(0));
+      g.fill();
+      g.restore();
+    }
+    // Every column is divided among the limits that rule in its time, in the order of the legend.
+    columns(g, sx, a, b, wide, high) {
+      const count = Math.max(Math.floor(wide / 3), 1), each = wide / count;
+      const share = Array.from(D.legend, () => new Float64Array(count));
+      for (let i = a; i <= b && this.x.length; i++) {
+        const from = Math.max((sx(this.x[i]) - this.left) / each, 0);
+        const to = Math.min(i < b ? (sx(this.x[i + 1]) - this.left) / each : count, count);
+        for (let k = Math.floor(from); k < to; k++) share[T.limit[i]][k] += Math.min(to, k + 1) - Math.max(from, k);
+      }
+      for (let k = 0, y; k < count; k++) {
+        y = this.top;
+        for (const [limit, parts] of share.entries()) {
+          g.fillStyle = D.legend[limit].colour;
+          g.fillRect(this.left + k * each, y, each + 0.3, parts[k] * high);
+          y += parts[k] * high;
+        }
+      }
     }
     mark(i) {
       const x = i === null ? NaN : this.left + (this.x[i] - this.window[0]) / (this.window[1] - this.window[0]) * (this.w - this.left - this.right);

@@ -91,15 +91,13 @@ pub(super) fn headline(report: &Report) -> Markup {
                     &format!("{arrived} of {} drives, {} set-points", sim.axes.len(), count(sim.setpoints)),
                     if all { "good" } else { "bad" },
                 ))
-                (card("Following error, simulated", &largest_error(report, &sim.axes), &rms_error(report, &sim.axes), ""))
-                @if let Some(c) = sim.contour {
-                    (card(
-                        "Contour error, simulated",
-                        &format!("{} mm", number(c.max_mm)),
-                        &format!("across the path, at most; rms {} mm", number(c.rms_mm)),
-                        "",
-                    ))
-                }
+                @let across = sim.contour.map(|c| format!(", {} mm of it across the path", number(c.max_mm)));
+                (card(
+                    "Following error, simulated",
+                    &largest_error(report, &sim.axes),
+                    &format!("at most{}", across.unwrap_or_default()),
+                    "",
+                ))
             }
         }
     }
@@ -127,12 +125,6 @@ fn largest_error(report: &Report, ends: &[DriveEnd]) -> String {
     let rows = report.axes.iter().zip(ends).filter(|(a, _)| a.linear == linear);
     let worst = rows.max_by(|x, y| x.1.max_error.total_cmp(&y.1.max_error));
     worst.map_or("\u{2013}".into(), |(a, e)| format!("{} {}", number(e.max_error), a.unit))
-}
-
-fn rms_error(report: &Report, ends: &[DriveEnd]) -> String {
-    let rows = report.axes.iter().zip(ends);
-    let rms = rows.map(|(a, e)| format!("{} {} {}", a.name, number(e.rms_error), a.unit));
-    format!("at most; rms {}", rms.collect::<Vec<_>>().join(", "))
 }
 
 /// The path, coloured.
@@ -232,11 +224,10 @@ pub(super) fn speed(report: &Report) -> Markup {
             h2 { "Speed" }
             div.pair {
                 (plot("speed", None, "Over time", unit))
-                (plot("phase", None, "Phase plot: over the path", unit))
+                (plot("phase", None, "Phase plot: feed moves over the path", unit))
             }
             p.note {
-                "Dashed: the most that the programmed feed and the axis velocities allow at that place. "
-                "Drag to magnify all plots over time together, double-click to go back."
+                "Shaded: what the programmed feed and the axis velocities allow at that place. Drag to magnify all plots over time together, double-click to go back."
             }
         }
     }

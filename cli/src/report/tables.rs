@@ -6,7 +6,10 @@ use planner::analysis::shortfall::Shortfall;
 use super::colour;
 use super::data::{PINS, speed_unit};
 use super::model::{Bounds, Limit, Report};
-use super::words::{bytes, count, duration, length, number, percent};
+use super::words::{aligned, bytes, count, duration, length, number, percent};
+
+/// Stands where there is nothing to say.
+const NOTHING: &str = "\u{2013}";
 
 /// Slow places shown at once; the others unfold.
 const SHOWN: usize = PINS;
@@ -39,6 +42,7 @@ pub(super) fn slow(report: &Report) -> Markup {
 }
 
 fn slow_table(report: &Report, places: &[Shortfall], from: usize, unit: &str) -> Markup {
+    let fastest = places.iter().map(|p| p.programmed).fold(0.0, f64::max);
     html! {
         div.scroll { table {
             thead { tr {
@@ -51,8 +55,8 @@ fn slow_table(report: &Report, places: &[Shortfall], from: usize, unit: &str) ->
                     td { (p.first_line) @if p.last_line != p.first_line { "\u{2013}" (p.last_line) } }
                     td.n { (length(p.length)) }
                     td.n { (number(p.programmed)) " " (unit) }
-                    td.n { (number(p.lowest)) }
-                    td.n { (number(p.mean)) }
+                    td.n { (aligned(p.lowest, fastest)) }
+                    td.n { (aligned(p.mean, fastest)) }
                     @let limit = Limit::from(p.limit);
                     td { i.swatch style=(format!("background:{}", colour::of_limit(limit))) {} (limit.words(&report.axes)) }
                     td.n { (duration(p.lost_s)) }
@@ -65,6 +69,8 @@ fn slow_table(report: &Report, places: &[Shortfall], from: usize, unit: &str) ->
 /// Time per operation.
 pub(super) fn operations(report: &Report) -> Markup {
     let total: f64 = report.operations.iter().map(|o| o.seconds()).sum();
+    let feeds = report.operations.iter().filter(|o| o.feed_s > 0.0).map(|o| o.feed_length_mm / o.feed_s);
+    let fastest = feeds.fold(0.0, f64::max);
     html! {
         @if total > 0.0 {
             section {
@@ -78,13 +84,17 @@ pub(super) fn operations(report: &Report) -> Markup {
                         tr {
                             td.wide { @if o.name.is_empty() { "before the first remark" } @else { (o.name) } }
                             td { (o.line.max(1)) }
-                            td.n { (duration(o.feed_s)) }
-                            td.n { (duration(o.rapid_s)) }
-                            td.n { (duration(o.dwell_s)) }
+                            @for seconds in [o.feed_s, o.rapid_s, o.dwell_s] {
+                                td.n { (if seconds > 0.0 { duration(seconds) } else { NOTHING.into() }) }
+                            }
                             td.n { b { (duration(o.seconds())) } }
                             td.n { (percent(o.seconds() / total)) }
-                            td.n { (length(o.feed_length_mm)) }
-                            td.n { @if o.feed_s > 0.0 { (number(o.feed_length_mm / o.feed_s)) " mm/s" } @else { "\u{2013}" } }
+                            @if o.feed_s > 0.0 {
+                                td.n { (length(o.feed_length_mm)) }
+                                td.n { (aligned(o.feed_length_mm / o.feed_s, fastest)) " mm/s" }
+                            } @else {
+                                td.n { (NOTHING) } td.n { (NOTHING) }
+                            }
                         }
                     } }
                 } }
@@ -141,7 +151,8 @@ pub(super) fn proof(report: &Report) -> Markup {
                     tbody { @for (a, d) in report.axes.iter().zip(&sim.axes) {
                         tr {
                             td { (a.name) }
-                            td.n { (d.target_counts) } td.n { (d.reached_counts) " counts" }
+                            td.n { (number(d.target_counts as f64)) " counts" }
+                            td.n { (number(d.reached_counts as f64)) " counts" }
                             td {
                                 @if d.arrived() { span.good { "\u{2713} exact, at rest" } }
                                 @else if d.at_rest { span.bad { "\u{2717} at rest elsewhere" } }

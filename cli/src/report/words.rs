@@ -77,7 +77,21 @@ pub fn number(value: f64) -> String {
         _ => 5,
     };
     let text = format!("{value:.decimals$}");
-    text.trim_end_matches('0').trim_end_matches('.').to_string()
+    text.trim_end_matches('0').trim_end_matches('.').replace('-', "\u{2212}")
+}
+
+/// A reading in a column whose entries are up to about `largest`: all with the same decimals.
+pub fn aligned(value: f64, largest: f64) -> String {
+    if !value.is_finite() {
+        return "\u{2013}".into();
+    }
+    let decimals: usize = match largest.abs() {
+        m if m >= 1000.0 => return number(value.round()),
+        m if m >= 10.0 => 1,
+        m if m >= 1.0 => 2,
+        _ => 4,
+    };
+    format!("{value:.decimals$}").replace('-', "\u{2212}")
 }
 
 #[cfg(test)]
@@ -105,8 +119,21 @@ mod tests {
     }
 
     #[test]
+    fn columns_share_their_decimals() {
+        assert_eq!(
+            [aligned(22.0, 80.0), aligned(7.329, 80.0), aligned(-0.04, 80.0)],
+            ["22.0", "7.3", "\u{2212}0.0"]
+        );
+        assert_eq!(
+            [aligned(4.8181, 6.0), aligned(0.5, 0.8), aligned(1234.5, 3e3)],
+            ["4.82", "0.5000", "1\u{202f}235"]
+        );
+    }
+
+    #[test]
     fn numbers_keep_four_digits_and_no_padding() {
         assert_eq!([number(0.01), number(150.0), number(12.345), number(0.0)], ["0.01", "150", "12.35", "0"]);
+        assert_eq!(number(-400.0), "\u{2212}400");
         assert_eq!(number(-50_000.0), "\u{2212}50\u{202f}000");
     }
 }

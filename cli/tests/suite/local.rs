@@ -84,5 +84,5 @@ fn the_parts_of_a_job_add_up() {
     let load = simulation["bus"]["load"].as_f64().unwrap();
     assert!(load > 0.0 && load < 1.0 && simulation["bus"]["frames"].as_u64() > Some(10));
     assert!(told["iterations"].as_u64() > Some(0));
-    assert!(report.contains("dwell") && report.contains("Contour error, simulated"));
+    assert!(report.contains("dwell") && report.contains("of it across the path"));
 }

@@ -100,7 +100,7 @@ fn every_headline_and_table_is_there() {
         "Stops by cause",
         "Machine limits",
         "no physical drive was used",
-        "Contour error, simulated",
+        "of it across the path",
         "crossed the bus",
         "before the first remark",
         "40 places",
