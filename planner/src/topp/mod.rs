@@ -35,6 +35,9 @@ const MOST_RESCALES: usize = 6;
 /// Headroom of the codes above the swept q.
 const CEILING: f64 = 1.1;
 
+/// What finer codes make of the ceiling: half the top speed makes them twice as fine.
+const FINER: f64 = 0.25;
+
 /// Finds the fastest motion from rest to rest along a path, rounded.
 ///
 /// The rounded table keeps every limit everywhere, by Bernstein bounds. Time and memory grow linearly with the path.
@@ -68,21 +71,37 @@ pub fn plan(problem: &Problem, settings: &Settings) -> Result<Plan, PlanError> {
     }
 }
 
-/// The limits, jerk lowered where a move would else be over in so few ticks that its spans could not last one each:
-/// rest to rest under jerk alone takes T with L = J T^3/32.
+/// The limits, lowered where they would let speed or acceleration change within so few ticks that no span could
+/// follow.
+///
+/// A move that is over in 8 ticks has its jerk lowered: rest to rest under jerk alone takes T with L = J T^3/32. Full
+/// speed takes at least 6 ticks to reach, full acceleration 2. What this costs is a few ticks per move.
 fn slowed(problem: &Problem) -> Vec<AxisLimits> {
-    const FEWEST_TICKS: f64 = 8.0;
-    let shortest = FEWEST_TICKS * problem.shortest_span_s;
+    const MOVE_TICKS: f64 = 8.0;
+    const SPEED_TICKS: f64 = 6.0;
+    const ACCELERATION_TICKS: f64 = 2.0;
+    let tick = problem.shortest_span_s;
+    if tick == 0.0 {
+        return problem.limits.to_vec();
+    }
+    let shortest = MOVE_TICKS * tick;
     problem
         .limits
         .iter()
         .zip(&problem.path.axes)
         .map(|(l, axis)| {
+            let acceleration = l.acceleration.min(l.velocity / (SPEED_TICKS * tick));
+            let mut jerk = l.jerk;
+            if jerk.is_finite() {
+                jerk = jerk.min(acceleration / (ACCELERATION_TICKS * tick));
+            }
             let travel = axis.controls.windows(2).map(|c| c[1].abs_diff(c[0]) as f64).sum::<f64>() * axis.lsb;
             let ruled = 32.0 * travel / shortest.powi(3);
             // Where acceleration saturates under that jerk, the move takes longer anyway.
-            let rules = travel > 0.0 && ruled < l.jerk && 0.25 * shortest * ruled < l.acceleration;
-            AxisLimits { jerk: if rules { ruled } else { l.jerk }, ..*l }
+            if travel > 0.0 && ruled < jerk && 0.25 * shortest * ruled < acceleration {
+                jerk = ruled;
+            }
+            AxisLimits { velocity: l.velocity, acceleration, jerk }
         })
         .collect()
 }
@@ -125,7 +144,10 @@ fn solve(
         source.joint = joints(problem, layout).map(|q| (q / unit).min(source.ceiling));
         let scale = rounding::scale(unit, source.ceiling);
         let half = rounding::halves(&source, scale, sweep);
-        let x = optimise(&source, settings, sweep, &half, iterations)?;
+        let Some(x) = optimise(&source, settings, sweep, &half, iterations) else {
+            source.ceiling *= FINER;
+            continue;
+        };
         let table = rounding::table(&source, scale, &x);
         let rounded = rounding::values(&source, &table);
         let findings = check::rows(&source, &rounded, &half);
@@ -133,27 +155,25 @@ fn solve(
             return Ok(Plan { table, binding: findings.binding, iterations: 0 });
         }
         worst = findings.span;
-        // Rounding alone breaks a limit: the codes are too coarse for the slowest places. Half the top speed makes
-        // them twice as fine.
-        source.ceiling *= 0.25;
+        // Rounding alone breaks a limit: the codes are too coarse for the slowest places.
+        source.ceiling *= FINER;
     }
     Err(PlanError::Resolution { span: worst, u: layout.start(problem.path, worst) })
 }
 
-/// Control values of minimum time.
+/// Control values of minimum time; `None` where rounding alone would break a limit at any speed.
 fn optimise(
     source: &RowSource,
     settings: &Settings,
     sweep: &Sweep,
     half: &[f64],
     iterations: &mut u64,
-) -> Result<Vec<f64>, PlanError> {
+) -> Option<Vec<f64>> {
     let mut x = start::profile(source);
     match settings.solver {
         Solver::InteriorPoint => {
-            *iterations +=
-                window::solve(source, &mut x, half, settings.relative_gap).ok_or(PlanError::Solver)?;
-            Ok(x)
+            *iterations += window::solve(source, &mut x, half, settings.relative_gap)?;
+            Some(x)
         }
         Solver::Clarabel => {
             let (layout, path) = (source.layout, source.problem.path);
@@ -164,10 +184,9 @@ fn optimise(
                     sweep.largest(from, to, &mut hint) / source.unit
                 })
                 .collect();
-            let (x, count) =
-                clarabel::solve(source, &swept, &x, half, settings.relative_gap).ok_or(PlanError::Solver)?;
+            let (x, count) = clarabel::solve(source, &swept, &x, half, settings.relative_gap)?;
             *iterations += count;
-            Ok(x)
+            Some(x)
         }
     }
 }

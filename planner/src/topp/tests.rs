@@ -192,3 +192,23 @@ fn exp_random() {
         }
     }
 }
+#[test]
+fn exp_one() {
+    let path = line(&[1.0, 0.0], 1.0, 1);
+    let p = planned("line", &path, &limits(2, 100.0, 500.0, 1e4), &[]);
+    for i in 1..p.table.spans() - 1 {
+        let crate::feed::table::SpanLaw::Quadratic { h, q } = p.table.law(i) else { continue };
+        let e = q[0] + h * (q[1] + h * q[2]);
+        println!(
+            "{i} h {h:.4} v {:.3} {:.3} a {:.1} {:.1} j {:.0} {:.0} T {:.5} {:?}",
+            q[0].sqrt(),
+            e.sqrt(),
+            q[1] / 2.0,
+            q[1] / 2.0 + q[2] * h,
+            q[2] * q[0].sqrt(),
+            q[2] * e.sqrt(),
+            p.table.law(i).duration(),
+            p.binding[i]
+        );
+    }
+}

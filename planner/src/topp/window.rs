@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::ipm::{Effort, Stretch, Workspace};
+use super::ipm::{Effort, SCALINGS, START_SLACK, Stretch, Workspace};
 use super::rows::RowSource;
 
 /// Spans per window.
@@ -85,9 +85,8 @@ fn stage(
 
 /// Scales the whole profile until its least slack is comfortable everywhere.
 fn scale_all(source: &RowSource, x: &mut [f64], half: &[f64]) -> Option<()> {
-    const COMFORT: f64 = 0.02;
     let m = x.len();
-    for _ in 0..100 {
+    for _ in 0..SCALINGS {
         let starts: Vec<usize> = (0..m).step_by(WINDOW / 4).collect();
         let least = starts
             .par_iter()
@@ -96,7 +95,7 @@ fn scale_all(source: &RowSource, x: &mut [f64], half: &[f64]) -> Option<()> {
                 work.settle()
             })
             .reduce(|| f64::INFINITY, f64::min);
-        if least > COMFORT {
+        if least > START_SLACK {
             return Some(());
         }
         x.iter_mut().for_each(|x| *x *= 0.8);

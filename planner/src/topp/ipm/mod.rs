@@ -20,7 +20,9 @@ const LEAST_CENTRING: f64 = 1e-5;
 /// Most iterations; runs end after 13 to 30.
 const MOST_ITERATIONS: u32 = 80;
 /// Least slack a start is scaled down to.
-const START_SLACK: f64 = 0.02;
+pub(super) const START_SLACK: f64 = 0.02;
+/// Most reductions of a start, by a fifth each.
+pub(super) const SCALINGS: u32 = 60;
 
 /// A stretch of control values to improve while its surroundings stand still.
 #[derive(Clone, Copy, Debug)]
@@ -114,7 +116,7 @@ impl Workspace {
     /// Only for a stretch that is the whole problem: pinned neighbours are scaled too.
     pub(super) fn scale_into(&mut self) -> Option<f64> {
         let mut scale = 1.0;
-        for _ in 0..100 {
+        for _ in 0..SCALINGS {
             if self.rows.set_tangents(&self.c) > START_SLACK {
                 return Some(scale);
             }
