@@ -176,8 +176,7 @@ impl PlanError {
             | PlanError::TooShort { .. }
             | PlanError::TooLong { .. }
             | PlanError::NothingMoves
-            | PlanError::Setting { .. }
-            | PlanError::Solver => None,
+            | PlanError::Setting { .. } => None,
         }
     }
 }
