@@ -126,9 +126,8 @@ fn tangent_bound(rows: &CellRows, c: &[f64; 3], x: &[f64; 3]) -> f64 {
     for (i, (a, _)) in rows.jerk.iter().enumerate() {
         force[i % 3] = force[i % 3].max(dot(a, c).abs());
     }
-    let at = |s: f64| {
-        (0..3).map(|k| force[k] / (1.5 * s) + s * s / 3.0 * x[k]).fold(f64::NEG_INFINITY, f64::max)
-    };
+    let at =
+        |s: f64| (0..3).map(|k| force[k] / (1.5 * s) + s * s / 3.0 * x[k]).fold(f64::NEG_INFINITY, f64::max);
     let low = x.iter().copied().fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE);
     let high = x.iter().copied().fold(0.0, f64::max).max(f64::MIN_POSITIVE);
     let (mut a, mut b) = (0.5 / high.sqrt(), 2.0 / low.sqrt());

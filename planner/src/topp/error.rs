@@ -61,7 +61,9 @@ pub enum PlanError {
         value: f64,
     },
     /// The caps do not rise, or end before the path does.
-    #[error("cap {index} of the path ends at grid step {until}; caps must be consecutive and end with the path")]
+    #[error(
+        "cap {index} of the path ends at grid step {until}; caps must be consecutive and end with the path"
+    )]
     CapOrder {
         /// Index of the cap.
         index: usize,

@@ -33,7 +33,8 @@ pub(super) fn place(problem: &Problem, settings: &Settings, sweep: &Sweep) -> Re
         return Err(PlanError::TooShort { steps: total, needed: MIN_SPANS as u64 });
     }
     let estimate = Estimate::new(problem, settings, sweep);
-    let (spans, seconds) = (estimate.count[estimate.count.len() - 1], estimate.clock[estimate.clock.len() - 1]);
+    let (spans, seconds) =
+        (estimate.count[estimate.count.len() - 1], estimate.clock[estimate.clock.len() - 1]);
     if spans.is_nan() || spans > MOST_SPANS {
         return Err(PlanError::TooLong { seconds, spans });
     }
@@ -58,13 +59,13 @@ pub(super) fn place(problem: &Problem, settings: &Settings, sweep: &Sweep) -> Re
     Ok(layout)
 }
 
-/// Divides each span `i` into `parts[i]` parts of about equal length; false where the grid is too coarse for that.
+/// Divides each span `i` into `parts[i]` parts of about equal length; the error is a span too short for that.
 pub(super) fn refine(path: &GridPath, layout: &Layout, parts: &[u32]) -> Result<Layout, usize> {
     let mut knots = vec![0];
     let mut cells = Vec::with_capacity(layout.spans());
-    for i in 0..layout.spans() {
+    for (i, &parts) in parts.iter().enumerate() {
         let (a, b) = (layout.knots[i], layout.knots[i + 1]);
-        let k = u64::from(parts[i].max(1));
+        let k = u64::from(parts.max(1));
         if b - a < k {
             return Err(i);
         }
@@ -158,7 +159,11 @@ impl<'a> Estimate<'a> {
         let length = path.length();
         // Away from rest under constant jerk: q = (6^(4/3)/4) (J/|p'|)^(2/3) u^(4/3).
         let from_rest = |d: f64, jerk: f64| {
-            if jerk.is_finite() { 6f64.powf(4.0 / 3.0) / 4.0 * (jerk * d * d).powf(2.0 / 3.0) } else { f64::INFINITY }
+            if jerk.is_finite() {
+                6f64.powf(4.0 / 3.0) / 4.0 * (jerk * d * d).powf(2.0 / 3.0)
+            } else {
+                f64::INFINITY
+            }
         };
         let speed: Vec<f64> = u
             .iter()

@@ -29,6 +29,13 @@ pub struct Settings {
     pub spans_per_ramp: f64,
 }
 
+impl Default for Settings {
+    /// Interior point, a gap of 1e-5 of the time, four spans per ramp: about 0.1 % above a very fine plan.
+    fn default() -> Self {
+        Settings { solver: Solver::InteriorPoint, relative_gap: 1e-5, spans_per_ramp: 4.0 }
+    }
+}
+
 /// The solvers behind the one problem type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solver {

@@ -179,9 +179,10 @@ impl RowSource<'_> {
     fn longest_enough(&self, s: usize, axes: &[Derivatives]) -> f64 {
         const ROUNDING_SHARE: f64 = 0.2;
         let top = (self.unit * self.ceiling).sqrt();
-        let shortest = axes.iter().zip(self.problem.limits).fold(self.problem.shortest_span_s, |t, (d, l)| {
-            rounding::shortest_s(d.first_max(), l, top, ROUNDING_SHARE).max(t)
-        });
+        let shortest =
+            axes.iter().zip(self.problem.limits).fold(self.problem.shortest_span_s, |t, (d, l)| {
+                rounding::shortest_s(d.first_max(), l, top, ROUNDING_SHARE).max(t)
+            });
         (self.layout.h[s + 1] / shortest).powi(2) / self.unit
     }
 

@@ -79,8 +79,12 @@ fn constant(rows: &RowSource, s: usize, pieces: &mut Pieces) -> (f64, f64) {
     let caps = rows.caps(s);
     q = q.min(caps.rate * caps.rate);
     for (mask, speed) in caps.tangential.iter().flatten() {
-        let square: f64 =
-            d.iter().enumerate().filter(|(a, _)| mask >> a & 1 == 1).map(|(_, d)| d.first_max().powi(2)).sum();
+        let square: f64 = d
+            .iter()
+            .enumerate()
+            .filter(|(a, _)| mask >> a & 1 == 1)
+            .map(|(_, d)| d.first_max().powi(2))
+            .sum();
         q = q.min(speed * speed / square);
     }
     q = q.min(rows.shortest_bound(s, pieces) * rows.unit);

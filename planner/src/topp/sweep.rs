@@ -15,7 +15,7 @@ pub struct Sweep {
     pub stations: Vec<f64>,
     /// q there; zero at both ends.
     pub q: Vec<f64>,
-    /// Largest q at standstill of jerk and path acceleration, jerk included.
+    /// Largest q, jerk of a steady speed included, at which the path can be travelled there.
     pub constant: Vec<f64>,
 }
 
@@ -54,7 +54,8 @@ impl Sweep {
                 strips.push(Strip { gain, slope, bound: l.acceleration });
             }
             for (mask, speed) in caps.tangential.iter().flatten() {
-                let square: f64 = (0..axes).filter(|a| mask >> a & 1 == 1).map(|a| d[a].first[0].powi(2)).sum();
+                let square: f64 =
+                    (0..axes).filter(|a| mask >> a & 1 == 1).map(|a| d[a].first[0].powi(2)).sum();
                 bound = bound.min(speed * speed / square);
             }
             bound = bound.min(curve_bound(&strips[from..]));

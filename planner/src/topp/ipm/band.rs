@@ -87,16 +87,21 @@ mod tests {
         for i in 0..n - 2 {
             let k = i as f64;
             let a = [1.0 + k, -2.0 + 0.3 * k, 0.5 * k - 1.0];
-            let m = [a[0] * a[0] + 1.0, a[0] * a[1], a[0] * a[2], a[1] * a[1] + 0.5, a[1] * a[2], a[2] * a[2] + 2.0];
+            let m = [
+                a[0] * a[0] + 1.0,
+                a[0] * a[1],
+                a[0] * a[2],
+                a[1] * a[1] + 0.5,
+                a[1] * a[2],
+                a[2] * a[2] + 2.0,
+            ];
             b.add(i, &m);
         }
         for (lo, hi) in [(0, n), (2, n - 2), (3, 4), (1, 3)] {
             let x: Vec<f64> = (0..n).map(|i| (i as f64 * 1.7).sin()).collect();
             let at = |i: usize, j: usize| b.band[i.min(j)].get(i.abs_diff(j)).copied().unwrap_or(0.0);
             let mut y = vec![0.0; n];
-            for i in lo..hi {
-                y[i] = (lo..hi).map(|j| at(i, j) * x[j]).sum();
-            }
+            (lo..hi).for_each(|i| y[i] = (lo..hi).map(|j| at(i, j) * x[j]).sum());
             b.factorise(lo, hi);
             b.solve(lo, hi, &mut y);
             for i in lo..hi {

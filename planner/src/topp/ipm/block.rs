@@ -204,7 +204,8 @@ impl Cell {
     /// Sets the tangent that makes the least slack largest (concave in s): golden section round 1/sqrt(x).
     fn best_tangent(&mut self, pairs: &[Pair], c: &[f64; 3]) {
         let x = [0, 1, 2].map(|k| dot(&self.x[k], c).max(f64::MIN_POSITIVE));
-        let (low, high) = (x.iter().copied().fold(f64::INFINITY, f64::min), x.iter().copied().fold(0.0, f64::max));
+        let (low, high) =
+            (x.iter().copied().fold(f64::INFINITY, f64::min), x.iter().copied().fold(0.0, f64::max));
         let (mut a, mut b) = (0.5 / high.sqrt(), 2.0 / low.sqrt());
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let at = |s: f64| self.jerk_slack(pairs, s, c);
@@ -293,7 +294,8 @@ impl Rows {
                         let before = t.base[k] - t.alpha * p.phi[l];
                         let after = n.base[k] - n.alpha * p.phi[l];
                         let (down, up) = (before - t.alpha * f[l], before + t.alpha * f[l]);
-                        let keep = (after - n.alpha * f[l] - KEPT * down).min(after + n.alpha * f[l] - KEPT * up);
+                        let keep =
+                            (after - n.alpha * f[l] - KEPT * down).min(after + n.alpha * f[l] - KEPT * up);
                         worst[l] = worst[l].min(keep);
                     }
                 }
@@ -328,14 +330,14 @@ impl Rows {
             let t = cell.tangent(cell.s, &c);
             for (p, b, jerk) in numbered(&mut self.pairs, cell) {
                 let v = product(&p.f, &c);
-                for l in 0..LANES {
+                for (l, v) in v.into_iter().enumerate() {
                     let (base, alpha) = if jerk {
                         (t.base[(LANES * b + l) % 3] - t.alpha * p.phi[l], t.alpha)
                     } else {
                         (cell.rhs, 1.0)
                     };
-                    f(base - alpha * v[l], &mut p.z[0][l]);
-                    f(base + alpha * v[l], &mut p.z[1][l]);
+                    f(base - alpha * v, &mut p.z[0][l]);
+                    f(base + alpha * v, &mut p.z[1][l]);
                 }
             }
         }
@@ -437,7 +439,14 @@ fn numbered<'a>(pairs: &'a mut [Pair], cell: &Cell) -> impl Iterator<Item = (&'a
 impl Pair {
     /// Both rows of each pair and their slacks.
     #[inline(always)]
-    fn sides(&self, f: &Lanes, t: &Tangent, rhs: f64, block: usize, jerk: bool) -> ([[Lanes; 3]; 2], [Lanes; 2]) {
+    fn sides(
+        &self,
+        f: &Lanes,
+        t: &Tangent,
+        rhs: f64,
+        block: usize,
+        jerk: bool,
+    ) -> ([[Lanes; 3]; 2], [Lanes; 2]) {
         if !jerk {
             let minus = self.f.map(|a| a.map(|v| -v));
             return ([self.f, minus], [lanes(|l| rhs - f[l]), lanes(|l| rhs + f[l])]);
@@ -477,8 +486,8 @@ impl Sums {
         grow(&mut self.m[3], |l| b[1][l] * a[1][l]);
         grow(&mut self.m[4], |l| b[1][l] * a[2][l]);
         grow(&mut self.m[5], |l| b[2][l] * a[2][l]);
-        for j in 0..3 {
-            grow(&mut self.g[j], |l| inverse[l] * a[j][l]);
+        for (g, a) in self.g.iter_mut().zip(a) {
+            grow(g, |l| inverse[l] * a[l]);
         }
         grow(&mut self.gap, |l| z[l] * slack[l]);
     }
@@ -507,12 +516,10 @@ impl AffineSums {
         let correction = lanes(|l| t[l] * (1.0 - r[l]));
         grow(&mut self.s1, |l| t[l]);
         grow(&mut self.s2, |l| t[l] * r[l]);
-        for l in 0..LANES {
-            self.rise[l] = if r[l] > self.rise[l] { r[l] } else { self.rise[l] };
-            self.fall[l] = if r[l] < self.fall[l] { r[l] } else { self.fall[l] };
-        }
-        for j in 0..3 {
-            grow(&mut self.g[j], |l| correction[l] * inverse[l] * a[j][l]);
+        self.rise = lanes(|l| if r[l] > self.rise[l] { r[l] } else { self.rise[l] });
+        self.fall = lanes(|l| if r[l] < self.fall[l] { r[l] } else { self.fall[l] });
+        for (g, a) in self.g.iter_mut().zip(a) {
+            grow(g, |l| correction[l] * inverse[l] * a[l]);
         }
         correction
     }
