@@ -59,13 +59,13 @@ pub(super) fn place(problem: &Problem, settings: &Settings, sweep: &Sweep) -> Re
     Ok(layout)
 }
 
-/// Divides each span `i` into `parts[i]` parts of about equal length; false where the grid is too coarse for that.
+/// Divides each span `i` into `parts[i]` parts of about equal length; the error is a span too short for that.
 pub(super) fn refine(path: &GridPath, layout: &Layout, parts: &[u32]) -> Result<Layout, usize> {
     let mut knots = vec![0];
     let mut cells = Vec::with_capacity(layout.spans());
-    for i in 0..layout.spans() {
+    for (i, &parts) in parts.iter().enumerate() {
         let (a, b) = (layout.knots[i], layout.knots[i + 1]);
-        let k = u64::from(parts[i].max(1));
+        let k = u64::from(parts.max(1));
         if b - a < k {
             return Err(i);
         }

@@ -46,22 +46,28 @@ const FINER: f64 = 0.25;
 ///
 /// [`PlanError`] names what makes the problem one without an answer, and where.
 pub fn plan(problem: &Problem, settings: &Settings) -> Result<Plan, PlanError> {
+    plan_whole_up_to(window::WHOLE, problem, settings)
+}
+
+/// [`plan`], in windows when there are more than `whole` spans.
+fn plan_whole_up_to(whole: usize, problem: &Problem, settings: &Settings) -> Result<Plan, PlanError> {
     error::validate(problem)?;
     validate_settings(settings)?;
     let limits = slowed(problem);
     let problem = &Problem { limits: &limits, ..*problem };
     let sweep = Sweep::new(problem);
     let mut layout = knots::place(problem, settings, &sweep)?;
+    let attempt = Attempt { whole, problem, settings, sweep: &sweep };
     let mut iterations = 0;
     for _ in 0..MOST_REFINEMENTS {
-        let plan = solve(problem, settings, &sweep, &layout, &mut iterations)?;
+        let plan = attempt.solve(&layout, &mut iterations)?;
         let Some(parts) = check::format(&layout, &plan.table) else {
             return Ok(Plan { iterations, ..plan });
         };
         layout = knots::refine(problem.path, &layout, &parts)
             .map_err(|span| format_error(problem, &layout, &plan, span))?;
     }
-    let plan = solve(problem, settings, &sweep, &layout, &mut iterations)?;
+    let plan = attempt.solve(&layout, &mut iterations)?;
     match check::format(&layout, &plan.table) {
         None => Ok(Plan { iterations, ..plan }),
         Some(parts) => {
@@ -123,71 +129,62 @@ fn validate_settings(settings: &Settings) -> Result<(), PlanError> {
     Ok(())
 }
 
-/// Solves on given knots, rounds and checks.
-fn solve(
-    problem: &Problem,
-    settings: &Settings,
-    sweep: &Sweep,
-    layout: &Layout,
-    iterations: &mut u64,
-) -> Result<Plan, PlanError> {
-    let unit = sweep.top();
-    let mut source = RowSource {
-        problem: *problem,
-        layout,
-        unit,
-        ceiling: CEILING,
-        joint: joints(problem, layout).map(|q| q / unit),
-    };
-    let mut worst = 1;
-    for _ in 0..MOST_RESCALES {
-        source.joint = joints(problem, layout).map(|q| (q / unit).min(source.ceiling));
-        let scale = rounding::scale(unit, source.ceiling);
-        let half = rounding::halves(&source, scale, sweep);
-        let Some(x) = optimise(&source, settings, sweep, &half, iterations) else {
-            source.ceiling *= FINER;
-            continue;
-        };
-        let table = rounding::table(&source, scale, &x);
-        let rounded = rounding::values(&source, &table);
-        let findings = check::rows(&source, &rounded, &half);
-        if findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC {
-            return Ok(Plan { table, binding: findings.binding, iterations: 0 });
-        }
-        worst = findings.span;
-        // Rounding alone breaks a limit: the codes are too coarse for the slowest places.
-        source.ceiling *= FINER;
-    }
-    Err(PlanError::Resolution { span: worst, u: layout.start(problem.path, worst) })
+/// What one solution after another is found from.
+struct Attempt<'a> {
+    whole: usize,
+    problem: &'a Problem<'a>,
+    settings: &'a Settings,
+    sweep: &'a Sweep,
 }
 
-/// Control values of minimum time; `None` where rounding alone would break a limit at any speed.
-fn optimise(
-    source: &RowSource,
-    settings: &Settings,
-    sweep: &Sweep,
-    half: &[f64],
-    iterations: &mut u64,
-) -> Option<Vec<f64>> {
-    let mut x = start::profile(source);
-    match settings.solver {
-        Solver::InteriorPoint => {
-            *iterations += window::solve(source, &mut x, half, settings.relative_gap)?;
-            Some(x)
+impl Attempt<'_> {
+    /// Solves on given knots, rounds and checks.
+    fn solve(&self, layout: &Layout, iterations: &mut u64) -> Result<Plan, PlanError> {
+        let problem = self.problem;
+        let unit = self.sweep.top();
+        let joints = joints(problem, layout);
+        let mut source = RowSource { problem: *problem, layout, unit, ceiling: CEILING, joint: joints };
+        let mut worst = 1;
+        for _ in 0..MOST_RESCALES {
+            source.joint = joints.map(|q| (q / unit).min(source.ceiling));
+            let scale = rounding::scale(unit, source.ceiling);
+            let half = rounding::halves(&source, scale, self.sweep);
+            if let Some(x) = self.optimise(&source, &half, iterations) {
+                let table = rounding::table(&source, scale, &x);
+                let rounded = rounding::values(&source, &table);
+                let findings = check::rows(&source, &rounded, &half);
+                if findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC {
+                    return Ok(Plan { table, binding: findings.binding, iterations: 0 });
+                }
+                worst = findings.span;
+            }
+            // Rounding alone breaks a limit: the codes are too coarse for the slowest places.
+            source.ceiling *= FINER;
         }
-        Solver::Clarabel => {
-            let (layout, path) = (source.layout, source.problem.path);
-            let mut hint = 0;
-            let swept: Vec<f64> = (1..layout.spans() - 1)
-                .map(|i| {
-                    let (from, to) = (layout.start(path, i), layout.start(path, i + 1));
-                    sweep.largest(from, to, &mut hint) / source.unit
-                })
-                .collect();
-            let (x, count) = clarabel::solve(source, &swept, &x, half, settings.relative_gap)?;
-            *iterations += count;
-            Some(x)
+        Err(PlanError::Resolution { span: worst, u: layout.start(problem.path, worst) })
+    }
+
+    /// Control values of minimum time; `None` where rounding alone would break a limit at any speed.
+    fn optimise(&self, source: &RowSource, half: &[f64], iterations: &mut u64) -> Option<Vec<f64>> {
+        let mut x = start::profile(source);
+        let gap = self.settings.relative_gap;
+        match self.settings.solver {
+            Solver::InteriorPoint => *iterations += window::solve(source, &mut x, half, gap, self.whole)?,
+            Solver::Clarabel => {
+                let (layout, path) = (source.layout, source.problem.path);
+                let mut hint = 0;
+                let swept: Vec<f64> = (1..layout.spans() - 1)
+                    .map(|i| {
+                        let (from, to) = (layout.start(path, i), layout.start(path, i + 1));
+                        self.sweep.largest(from, to, &mut hint) / source.unit
+                    })
+                    .collect();
+                let (answer, count) = clarabel::solve(source, &swept, &x, half, gap)?;
+                *iterations += count;
+                x = answer;
+            }
         }
+        Some(x)
     }
 }
 

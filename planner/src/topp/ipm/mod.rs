@@ -33,15 +33,6 @@ pub(super) struct Stretch {
     pub(super) to: usize,
 }
 
-/// How a stretch is solved.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Effort {
-    /// Stop when the gap is below this share of the time.
-    pub(super) relative_gap: f64,
-    /// First barrier parameter, as a share of the one that balances the start.
-    pub(super) warmth: f64,
-}
-
 /// Gauss points of one span, as rows of its three control values.
 #[derive(Clone, Debug)]
 struct SpanTime {
@@ -126,7 +117,7 @@ impl Workspace {
         None
     }
 
-    /// Sets the tangents for the loaded profile and returns its least slack.
+    /// Sets the tangents for the loaded profile and returns their least slack.
     pub(super) fn settle(&mut self) -> f64 {
         self.rows.set_tangents(&self.c)
     }
@@ -166,8 +157,8 @@ impl Workspace {
         time
     }
 
-    /// Improves the loaded profile; returns the iterations it took.
-    pub(super) fn solve(&mut self, effort: Effort) -> u32 {
+    /// Improves the loaded profile until the gap is below a share of the time; returns the iterations it took.
+    pub(super) fn solve(&mut self, relative_gap: f64) -> u32 {
         let n = self.c.len();
         let [lo, hi] = self.free;
         self.best.clone_from(&self.c);
@@ -177,7 +168,7 @@ impl Workspace {
         self.band.reset(n);
         let _ = self.time();
         let balance = -(lo..hi).map(|j| self.gradient[j] * self.c[j]).sum::<f64>();
-        let mu = effort.warmth * balance / self.rows.push_back(&self.c).max(f64::MIN_POSITIVE);
+        let mu = balance / self.rows.push_back(&self.c).max(f64::MIN_POSITIVE);
         if !(mu.is_finite() && mu > 0.0) {
             return 0;
         }
@@ -193,7 +184,7 @@ impl Workspace {
                 self.best.clone_from(&self.c);
             }
             let gap = self.assemble(dual_step);
-            if gap < effort.relative_gap * time && (time - last_time).abs() < effort.relative_gap * time {
+            if gap < relative_gap * time && (time - last_time).abs() < relative_gap * time {
                 return iteration;
             }
             last_time = time;
