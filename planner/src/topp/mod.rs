@@ -97,10 +97,7 @@ fn slowed(problem: &Problem) -> Vec<AxisLimits> {
         .zip(&problem.path.axes)
         .map(|(l, axis)| {
             let acceleration = l.acceleration.min(l.velocity / (SPEED_TICKS * tick));
-            let mut jerk = l.jerk;
-            if jerk.is_finite() {
-                jerk = jerk.min(acceleration / (ACCELERATION_TICKS * tick));
-            }
+            let mut jerk = l.jerk.min(acceleration / (ACCELERATION_TICKS * tick));
             let travel = axis.controls.windows(2).map(|c| c[1].abs_diff(c[0]) as f64).sum::<f64>() * axis.lsb;
             let ruled = 32.0 * travel / shortest.powi(3);
             // Where acceleration saturates under that jerk, the move takes longer anyway.
