@@ -2,6 +2,9 @@
 //!
 //! Field names are a contract: they are only ever added to. Numbers that are not finite appear as `null`.
 
+use std::collections::BTreeMap;
+
+use planner::analysis::operations::Operation;
 use serde::Serialize;
 
 use crate::failure::{Blame, Failure};
@@ -29,6 +32,8 @@ pub struct PlanJson {
     pub dwells: u64,
     /// Places where the motion comes to rest.
     pub stops: u64,
+    /// The same by cause; causes that do not occur are absent.
+    pub stops_by_cause: BTreeMap<&'static str, u64>,
     /// Length of the programmed feed moves, arcs as true arcs [mm].
     pub feed_length_mm: f64,
     /// Length of the rapid moves [mm].
@@ -49,6 +54,12 @@ pub struct PlanJson {
     pub constant_feed_time_s: f64,
     /// The same limits with a rest after every block [s].
     pub stop_every_block_time_s: Option<f64>,
+    /// What limits the speed for how long, longest first.
+    pub binding: Vec<BindingJson>,
+    /// Where the programmed feed is not reached: the places that cost most, most costly first.
+    pub feed_not_reached: Vec<FeedNotReachedJson>,
+    /// Time per operation, in program order.
+    pub operations: Vec<Operation>,
     /// Spans of q.
     pub spans: u64,
     /// Size of the feed tables, all axes [bytes].
@@ -59,6 +70,8 @@ pub struct PlanJson {
     pub peak_memory_mib: Option<f64>,
     /// Name of the solver.
     pub solver: String,
+    /// Its iterations, all sections together.
+    pub iterations: u64,
     /// The proof.
     pub certificate: CertificateJson,
     /// The simulated motion; only `run` has it.
@@ -77,6 +90,42 @@ pub struct AxisJson {
     pub name: String,
     /// Unit of its positions.
     pub unit: String,
+}
+
+/// Motion time ruled by one limit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BindingJson {
+    /// `velocity`, `acceleration`, `jerk`, `feed`, `rest` or `free`.
+    pub kind: &'static str,
+    /// The axis whose limit it is; null for the other kinds.
+    pub axis: Option<String>,
+    /// How long it rules [s].
+    pub seconds: f64,
+    /// Of the motion time.
+    pub share: f64,
+}
+
+/// A place where the programmed feed is not reached.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FeedNotReachedJson {
+    /// First line of the program.
+    pub first_line: u32,
+    /// Last line of the program.
+    pub last_line: u32,
+    /// Length of the path [mm].
+    pub length_mm: f64,
+    /// Programmed feed [mm/s].
+    pub programmed_mm_s: f64,
+    /// Lowest speed [mm/s].
+    pub lowest_mm_s: f64,
+    /// Mean speed [mm/s].
+    pub mean_mm_s: f64,
+    /// `velocity`, `acceleration`, `jerk`, `rest` or `free`.
+    pub limited_by: &'static str,
+    /// The axis whose limit it is; null for the other kinds.
+    pub axis: Option<String>,
+    /// Time lost against the programmed feed [s].
+    pub lost_s: f64,
 }
 
 /// A box in the linear axes, in the machine's order.
@@ -116,10 +165,27 @@ pub struct SimulationJson {
     pub max_following_error_mm: f64,
     /// Root mean square of the linear axes' following error [mm].
     pub rms_following_error_mm: f64,
+    /// Largest distance of the load from the path of the set-points, linear axes [mm].
+    pub max_contour_error_mm: f64,
+    /// Root mean square of it [mm].
+    pub rms_contour_error_mm: f64,
+    /// What crossed the bus.
+    pub bus: BusJson,
     /// Every drive stands at rest on the exact count of the program's end point.
     pub at_end: bool,
     /// Simulated time per second of computing.
     pub real_time_factor: f64,
+}
+
+/// What crossed the simulated bus.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BusJson {
+    /// Frames.
+    pub frames: u64,
+    /// Payload in them [bytes].
+    pub bytes: u64,
+    /// Share of the time that the wire was busy.
+    pub load: f64,
 }
 
 /// A remark.
@@ -163,7 +229,9 @@ pub struct VerifyJson {
     pub certificate: CertificateJson,
     /// The same ratios per axis.
     pub axes: Vec<AxisRatiosJson>,
-    /// What does not hold, the first of it; empty when everything does.
+    /// Number of faults.
+    pub fault_count: u64,
+    /// The first of them, in words with their places; empty when everything holds.
     pub faults: Vec<String>,
     /// Time to verify [s].
     pub verify_seconds: f64,

@@ -1,7 +1,7 @@
 //! What a verb prints for people: one aligned column of names, one of values.
 
-use crate::json::{CertificateJson, InspectJson, PlanJson, VerifyJson};
-use crate::report::words::{bytes, count, duration, length, times};
+use crate::json::{BusJson, CertificateJson, InspectJson, PlanJson, VerifyJson};
+use crate::report::words::{bytes, count, duration, length, percent, times};
 
 /// The summary of `plan` and `run`.
 pub fn plan(p: &PlanJson) -> String {
@@ -31,6 +31,10 @@ pub fn plan(p: &PlanJson) -> String {
         s.row("simulated drives", &format!("{} set-points, {end}", count(sim.setpoints)));
         let (max, rms) = (sim.max_following_error_mm, sim.rms_following_error_mm);
         s.row("following error", &format!("{max:.4} mm at most, {rms:.4} mm rms"));
+        let (max, rms) = (sim.max_contour_error_mm, sim.rms_contour_error_mm);
+        s.row("contour error", &format!("{max:.4} mm at most, {rms:.4} mm rms"));
+        let BusJson { frames, bytes: size, load } = sim.bus;
+        s.row("bus", &format!("{} frames, {}, busy {}", count(frames), bytes(size), percent(load)));
     }
     let memory = p.peak_memory_mib.map(|m| format!(", {m:.0} MiB")).unwrap_or_default();
     s.row("planned in", &format!("{}{memory}", duration(p.plan_seconds)));
@@ -62,6 +66,12 @@ pub fn verify(v: &VerifyJson) -> String {
         );
     }
     s.certificate(&v.certificate);
+    for fault in &v.faults {
+        s.row("fault", fault);
+    }
+    if v.fault_count > v.faults.len() as u64 {
+        s.row("", &format!("and {} more", count(v.fault_count - v.faults.len() as u64)));
+    }
     s.text
 }
 

@@ -3,7 +3,7 @@
 //! [`scenario::simulate`] plays a planned job to its end: a [`host_node`] sends its tables over a [`bus`] in virtual
 //! time to one [`drive_node`] per axis, which runs the very core that drives run; behind each set-point an
 //! [`axis_loop`] closes [`encoder`], [`servo`] and [`plant`]. Meanwhile [`recording`] compares set-points with the
-//! plan ([`reference`](mod@reference)), hashes them, feeds the [`trace`] and gathers the [`statistics`] of the
+//! plan ([`planner::analysis::motion`]), hashes them, feeds the [`trace`] and gathers the [`statistics`] of the
 //! [`report`]. Everything runs in one thread and in one order: two runs are the same to the bit.
 
 pub mod axis_loop;
@@ -14,7 +14,6 @@ pub mod encoder;
 pub mod host_node;
 pub mod plant;
 pub mod recording;
-pub mod reference;
 pub mod report;
 pub mod scenario;
 pub mod servo;

@@ -2,12 +2,12 @@
 
 use std::io;
 
+use planner::analysis::motion::Cursor;
 use planner::feed::table::FeedTable;
 use planner::job::machine::{AxisKind, Machine, Unit};
 
 use crate::axis_loop::{AxisLoop, AxisLoopError, CountSetpoint};
 use crate::axis_scale::is_linear;
-use crate::reference::PlannedMotion;
 use crate::report::AxisReport;
 use crate::setpoint_hash::SetpointHash;
 use crate::statistics::{ContourError, Magnitude};
@@ -24,7 +24,8 @@ pub struct Recording<'a> {
     linear: Vec<usize>,
     present: Vec<CountSetpoint>,
     samples: Vec<AxisSample>,
-    motion: Option<PlannedMotion<'a>>,
+    /// The planned motion in f64 and closed form; it shares nothing with the drives' evaluator but the table.
+    motion: Option<Cursor<'a>>,
     tables: usize,
     place: Option<Place>,
     hash: SetpointHash,
@@ -85,7 +86,7 @@ impl<'a> Recording<'a> {
 
     /// From now on set-points are compared with `table`.
     pub fn begin_table(&mut self, table: &'a FeedTable) {
-        self.motion = Some(PlannedMotion::new(table));
+        self.motion = Some(Cursor::new(table));
         self.tables += 1;
     }
 
@@ -121,11 +122,11 @@ impl<'a> Recording<'a> {
             self.hash.add(tick, axis as u8, s.position, s.velocity, s.acceleration);
         }
         let Some(motion) = &mut self.motion else { return };
-        let x = motion.seek(tick as f64 * self.tick_s);
-        for (axis, s) in next.iter().enumerate() {
-            let planned = motion.position(axis, x, self.machine.axes[axis].counts_per_unit);
-            let off = (s.position as f64 - planned).abs();
-            self.deviation[axis] = self.deviation[axis].max(off);
+        let state = motion.seek(tick as f64 * self.tick_s);
+        let counts = self.machine.axes.iter().map(|axis| axis.counts_per_unit);
+        let planned = motion.axes(&state).zip(counts).map(|(axis, counts)| axis.position * counts);
+        for ((worst, s), planned) in self.deviation.iter_mut().zip(next).zip(planned) {
+            *worst = worst.max((s.position as f64 - planned).abs());
         }
     }
 

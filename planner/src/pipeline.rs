@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 
 use rayon::prelude::*;
 
+use crate::analysis::binding::rulings;
 use crate::certificate::{Certificate, certify};
 use crate::feed::job::{JobItem, PlannedSection};
 use crate::geometry::section::Section;
@@ -182,5 +183,6 @@ fn plan_section<E>(
     })?;
     let certificate = certify(&plan.table, &limits, &marks.caps);
     let section = PlannedSection { kind, limits, table: plan.table, marks };
-    Ok(Planned::Section { section, certificate, binding: plan.binding, iterations: plan.iterations })
+    let binding = rulings(&section);
+    Ok(Planned::Section { section, certificate, binding, iterations: plan.iterations })
 }

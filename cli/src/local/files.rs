@@ -66,6 +66,7 @@ pub(super) fn verify(path: &Path, progress: &mut Progress) -> Result<VerifyJson,
             feed_ratio: (report.feed_ratio > 0.0).then_some(report.feed_ratio),
         },
         axes: axes.collect(),
+        fault_count: report.fault_count as u64,
         faults: report
             .faults
             .iter()

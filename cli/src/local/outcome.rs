@@ -1,21 +1,41 @@
 //! The numbers and the report of a planned or played job.
 
+use planner::analysis::binding::{self, BindingShares};
 use planner::analysis::operations::{Operation, operations};
+use planner::analysis::shortfall::{Shortfall, Shortfalls};
 use planner::certificate::AxisRatios;
 use planner::feed::file::{FeedWriter, FileHeader};
 use planner::feed::job::JobItem;
 use planner::feed::pack::{TableBytes, pack};
 use planner::job::machine::{Axis, AxisKind, AxisLimits, Machine, Unit};
 use planner::job::program::{MoveKind, StopCause};
+use planner::topp::problem::Binding;
 
 use super::fitting::Fitted;
 use super::playback::{Drives, seconds};
 use crate::args::{Limits, PlanArgs, Solver};
 use crate::engine::Outcome;
 use crate::failure::Failure;
-use crate::json::{AxisJson, BoxJson, CertificateJson, FilesJson, NoteJson, PlanJson, SimulationJson};
+use crate::json::{
+    AxisJson, BindingJson, BoxJson, BusJson, CertificateJson, FeedNotReachedJson, FilesJson, NoteJson,
+    PlanJson, SimulationJson,
+};
 use crate::memory::peak_memory_mib;
 use crate::report::model::{self, Motion, Report};
+
+/// Most places listed where the programmed feed is not reached: in the report, and in the JSON object.
+const PLACES: [usize; 2] = [40, 20];
+
+/// Most operations that the report lists one by one; what follows is added to the last.
+const OPERATIONS: usize = 60;
+
+/// What the planner's analysis finds in a planned job.
+struct Findings {
+    shares: Vec<binding::Share>,
+    dwell_s: f64,
+    slow: model::SlowPlaces,
+    operations: Vec<Operation>,
+}
 
 /// Everything that there is to tell of a job.
 ///
@@ -28,9 +48,34 @@ pub(super) fn assemble(
     drives: Option<&Drives>,
 ) -> Result<Outcome, Failure> {
     let size = table_size(fitted)?;
-    let json = plan_json(args, fitted, &size, drives);
-    let report = report(args, fitted, &json, size, motion, drives);
+    let findings = analyse(fitted);
+    let json = plan_json(args, fitted, &size, &findings, drives);
+    let report = report(args, fitted, &json, size, findings, motion, drives);
     Ok(Outcome { json, report, feed: feed_file(fitted)? })
+}
+
+fn analyse(fitted: &Fitted) -> Findings {
+    let mut rulings = fitted.plan.binding.iter();
+    let (mut shares, mut slow, mut dwell_s) = (BindingShares::default(), Shortfalls::new(PLACES[0]), 0.0);
+    for item in &fitted.plan.items {
+        match item {
+            JobItem::Section(section) => {
+                shares.add(section, rulings.next().map_or(&[], Vec::as_slice));
+                slow.add(section);
+            }
+            JobItem::Dwell { seconds, .. } => {
+                dwell_s += seconds;
+                slow.wait(*seconds);
+            }
+            JobItem::Note { .. } => {}
+        }
+    }
+    Findings {
+        shares: shares.shares(),
+        dwell_s,
+        slow: model::SlowPlaces { count: slow.count, lost_s: slow.lost_s, places: slow.worst() },
+        operations: operations(&fitted.plan.items),
+    }
 }
 
 /// The `.feed` file.
@@ -71,7 +116,13 @@ fn table_size(fitted: &Fitted) -> Result<model::TableSize, Failure> {
     Ok(size)
 }
 
-fn plan_json(args: &PlanArgs, fitted: &Fitted, size: &model::TableSize, drives: Option<&Drives>) -> PlanJson {
+fn plan_json(
+    args: &PlanArgs,
+    fitted: &Fitted,
+    size: &model::TableSize,
+    findings: &Findings,
+    drives: Option<&Drives>,
+) -> PlanJson {
     let Fitted { machine, plan, counters, comparison, stops, tolerance, .. } = fitted;
     let motion_time_s = plan.sections().map(|s| s.table.duration()).sum();
     let linear: Vec<usize> =
@@ -91,6 +142,7 @@ fn plan_json(args: &PlanArgs, fitted: &Fitted, size: &model::TableSize, drives: 
         splines: 0,
         dwells: counters.dwells,
         stops: stops.values().sum(),
+        stops_by_cause: stops.iter().map(|(&cause, &count)| (stop_name(cause), count)).collect(),
         feed_length_mm: counters.feed_length_mm,
         rapid_length_mm: counters.rapid_length_mm,
         bounding_box_mm: BoxJson { min: corner(|b| &b.min), max: corner(|b| &b.max) },
@@ -101,15 +153,51 @@ fn plan_json(args: &PlanArgs, fitted: &Fitted, size: &model::TableSize, drives: 
         motion_time_s,
         constant_feed_time_s: comparison.constant_feed_time_s,
         stop_every_block_time_s: Some(comparison.stop_at_every_block_time_s),
+        binding: findings.shares.iter().map(|s| binding_json(s, machine)).collect(),
+        feed_not_reached: findings
+            .slow
+            .places
+            .iter()
+            .take(PLACES[1])
+            .map(|p| place_json(p, machine))
+            .collect(),
+        operations: findings.operations.clone(),
         spans: size.spans,
         table_bytes: size.total(),
         plan_seconds: fitted.seconds,
         peak_memory_mib: peak_memory_mib(),
         solver: solver(args.solver).into(),
+        iterations: plan.iterations,
         certificate: verdict(args, fitted),
         simulation: drives.map(simulation_json),
         notes: notes(fitted),
         files: FilesJson::default(),
+    }
+}
+
+/// Kind of a limit, and its axis by name.
+fn named(limit: Binding, machine: &Machine) -> (&'static str, Option<String>) {
+    let (kind, axis) = binding::name(limit);
+    (kind, axis.and_then(|i| machine.axes.get(usize::from(i))).map(|a| a.name.clone()))
+}
+
+fn binding_json(share: &binding::Share, machine: &Machine) -> BindingJson {
+    let (kind, axis) = named(share.limit, machine);
+    BindingJson { kind, axis, seconds: share.seconds, share: share.share }
+}
+
+fn place_json(place: &Shortfall, machine: &Machine) -> FeedNotReachedJson {
+    let (limited_by, axis) = named(place.limit, machine);
+    FeedNotReachedJson {
+        first_line: place.first_line,
+        last_line: place.last_line,
+        length_mm: place.length,
+        programmed_mm_s: place.programmed,
+        lowest_mm_s: place.lowest,
+        mean_mm_s: place.mean,
+        limited_by,
+        axis,
+        lost_s: place.lost_s,
     }
 }
 
@@ -121,9 +209,17 @@ fn simulation_json(drives: &Drives) -> SimulationJson {
         max_path_deviation_counts: r.max_path_deviation_counts,
         max_following_error_mm: r.max_following_error_mm,
         rms_following_error_mm: r.rms_following_error_mm,
+        max_contour_error_mm: r.max_contour_error_mm,
+        rms_contour_error_mm: r.rms_contour_error_mm,
+        bus: bus_json(drives),
         at_end: r.at_end,
         real_time_factor: r.cycle_time_s / drives.seconds.max(1e-9),
     }
+}
+
+fn bus_json(drives: &Drives) -> BusJson {
+    let bus = &drives.report.bus;
+    BusJson { frames: bus.frames, bytes: bus.bytes, load: bus.load }
 }
 
 /// The largest proven deviation of a feed section [mm], and its line.
@@ -161,6 +257,7 @@ fn report(
     fitted: &Fitted,
     json: &PlanJson,
     size: model::TableSize,
+    findings: Findings,
     motion: Motion,
     drives: Option<&Drives>,
 ) -> Report {
@@ -207,7 +304,7 @@ fn report(
             rapid_mm: json.rapid_length_mm,
         },
         axes: report_axes(&fitted.machine),
-        operations: shown(operations(&fitted.plan.items)),
+        operations: shown(findings.operations),
         stops,
         certificate: model::Certificate {
             verdict: json.certificate,
@@ -222,10 +319,12 @@ fn report(
         },
         table: size,
         motion,
+        shares: with_dwells(&findings.shares, findings.dwell_s),
+        slow: findings.slow,
         simulation: drives.map(|d| simulation(fitted, d)),
         planning: model::Planning {
             solver: json.solver.clone(),
-            iterations: fitted.plan.iterations,
+            iterations: json.iterations,
             seconds: json.plan_seconds,
             peak_memory_mib: json.peak_memory_mib,
         },
@@ -240,6 +339,10 @@ fn simulation(fitted: &Fitted, drives: &Drives) -> model::Simulation {
         setpoints: r.setpoints,
         setpoint_hash: format!("{:016x}", r.setpoint_hash),
         path_deviation_counts: r.max_path_deviation_counts,
+        contour: fitted.machine.axes.iter().any(|a| a.kind == AxisKind::Linear).then_some(
+            model::ContourError { max_mm: r.max_contour_error_mm, rms_mm: r.rms_contour_error_mm },
+        ),
+        bus: bus_json(drives),
         axes: r
             .axes
             .iter()
@@ -255,30 +358,30 @@ fn simulation(fitted: &Fitted, drives: &Drives) -> model::Simulation {
     }
 }
 
-/// Most operations listed one by one; what follows is added to the last.
-const OPERATIONS: usize = 60;
+/// The limits' shares of the motion, and of the cycle what the waits take.
+fn with_dwells(shares: &[binding::Share], dwell_s: f64) -> Vec<model::Share> {
+    let mut all: Vec<model::Share> =
+        shares.iter().map(|s| model::Share { limit: s.limit.into(), seconds: s.seconds }).collect();
+    if dwell_s > 0.0 {
+        all.push(model::Share { limit: model::Limit::Dwell, seconds: dwell_s });
+    }
+    all.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
+    all
+}
 
-fn shown(mut all: Vec<Operation>) -> Vec<model::Operation> {
+fn shown(mut all: Vec<Operation>) -> Vec<Operation> {
     let rest = all.split_off(all.len().min(OPERATIONS));
     if let Some(last) = all.last_mut() {
         for more in rest {
             last.name = "everything after".into();
-            last.cutting_s += more.cutting_s;
+            last.feed_s += more.feed_s;
             last.rapid_s += more.rapid_s;
             last.dwell_s += more.dwell_s;
-            last.cutting_length += more.cutting_length;
-            last.rapid_length += more.rapid_length;
+            last.feed_length_mm += more.feed_length_mm;
+            last.rapid_length_mm += more.rapid_length_mm;
         }
     }
-    let row = |o: Operation| model::Operation {
-        name: if o.name.is_empty() { "program".into() } else { o.name },
-        line: o.line,
-        feed_s: o.cutting_s,
-        rapid_s: o.rapid_s,
-        dwell_s: o.dwell_s,
-        feed_mm: o.cutting_length,
-    };
-    all.into_iter().map(row).collect()
+    all
 }
 
 /// The machine's axes as the report shows them.
@@ -317,6 +420,22 @@ fn solver(solver: Solver) -> &'static str {
     }
 }
 
+/// The name of a cause in the JSON object.
+fn stop_name(cause: StopCause) -> &'static str {
+    match cause {
+        StopCause::ProgramStop => "program_stop",
+        StopCause::ProgramEnd => "program_end",
+        StopCause::Spindle => "spindle",
+        StopCause::ToolChange => "tool_change",
+        StopCause::OffsetChange => "offset_change",
+        StopCause::Dwell => "dwell",
+        StopCause::ExactStop => "exact_stop",
+        StopCause::ExactPathCorner => "exact_path_corner",
+        StopCause::Reversal => "reversal",
+        StopCause::Rapid => "rapid",
+    }
+}
+
 fn stop_words(cause: StopCause) -> &'static str {
     match cause {
         StopCause::ProgramStop => "program stop (M0, M1, M60)",
@@ -329,5 +448,49 @@ fn stop_words(cause: StopCause) -> &'static str {
         StopCause::ExactPathCorner => "corner on an exact path (G61)",
         StopCause::Reversal => "reversal of direction",
         StopCause::Rapid => "start or end of a rapid",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_documentation_names_every_cause_of_a_stop() {
+        let text = include_str!("../../../docs/json.md");
+        for cause in [
+            StopCause::ProgramStop,
+            StopCause::ProgramEnd,
+            StopCause::Spindle,
+            StopCause::ToolChange,
+            StopCause::OffsetChange,
+            StopCause::Dwell,
+            StopCause::ExactStop,
+            StopCause::ExactPathCorner,
+            StopCause::Reversal,
+            StopCause::Rapid,
+        ] {
+            assert!(text.contains(&format!("`{}`", stop_name(cause))), "{cause:?}");
+        }
+    }
+
+    #[test]
+    fn long_lists_of_operations_end_in_a_sum() {
+        let operation = |k: u32| Operation { name: format!("{k}"), feed_s: 1.0, ..Operation::default() };
+        let all: Vec<Operation> = (0..100).map(operation).collect();
+        let short = shown(all.clone());
+        assert_eq!(short.len(), OPERATIONS);
+        assert_eq!(short[OPERATIONS - 1].feed_s, 100.0 - (OPERATIONS - 1) as f64);
+        assert_eq!(shown(all[..10].to_vec()), all[..10]);
+    }
+
+    #[test]
+    fn waits_take_their_place_among_the_limits() {
+        let share = |limit, seconds| binding::Share { limit, seconds, share: 0.5 };
+        let shares = [share(Binding::Feed, 3.0), share(Binding::Jerk(1), 1.0)];
+        let all = with_dwells(&shares, 2.0);
+        let limits: Vec<model::Limit> = all.iter().map(|s| s.limit).collect();
+        assert_eq!(limits, [model::Limit::Feed, model::Limit::Dwell, model::Limit::Jerk(1)]);
+        assert_eq!(with_dwells(&shares, 0.0).len(), 2);
     }
 }

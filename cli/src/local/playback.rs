@@ -14,7 +14,7 @@ use super::outcome::report_axes;
 use super::walk::Walk;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::report::model::{Limit, Mode, Motion};
+use crate::report::model::Motion;
 use crate::report::record::{AxisInstant, DriveInstant, Instant, Recorder};
 
 /// Instants of a plan that is only looked at.
@@ -41,19 +41,29 @@ pub(super) fn planned(fitted: &Fitted) -> Motion {
     let interval = fitted.machine.control_tick_s.max(cycle / INSTANTS);
     let mut recorder = Recorder::new(&report_axes(&fitted.machine));
     let mut binding = fitted.plan.binding.iter();
-    let mut clock = 0.0;
+    let (mut clock, mut standing) = (0.0, Vec::new());
     for item in &fitted.plan.items {
-        if let JobItem::Section(section) = item {
-            let binding = binding.next().map_or(&[][..], Vec::as_slice);
-            let mut walk = Walk::new(section, binding, linear(fitted));
-            let duration = walk.duration();
-            let count = (duration / interval).ceil().max(1.0) as u64;
-            for k in 0..=count {
-                let time = (k as f64 * interval).min(duration);
-                recorder.push(&walk.instant(time, clock + time, &[]));
+        let duration = seconds(item);
+        match item {
+            JobItem::Section(section) => {
+                let binding = binding.next().map_or(&[][..], Vec::as_slice);
+                let mut walk = Walk::new(section, binding, linear(fitted));
+                let count = (duration / interval).ceil().max(1.0) as u64;
+                for k in 0..=count {
+                    let time = (k as f64 * interval).min(duration);
+                    recorder.push(&walk.instant(time, clock + time, &[]));
+                }
+                let end = walk.instant(duration, clock + duration, &[]);
+                standing = end.axes.iter().map(|a| AxisInstant::standing(a.position, None)).collect();
             }
+            // Before the first section nothing is known of where the machine stands.
+            JobItem::Dwell { line, .. } if !standing.is_empty() => {
+                recorder.push(&Instant::standing(clock, *line, &standing));
+                recorder.push(&Instant::standing(clock + duration, *line, &standing));
+            }
+            JobItem::Dwell { .. } | JobItem::Note { .. } => {}
         }
-        clock += seconds(item);
+        clock += duration;
     }
     recorder.finish()
 }
@@ -134,20 +144,8 @@ impl TraceSink for Watch<'_> {
         let Some(place) = row.place else {
             self.still.clear();
             let axes = row.axes.iter().zip(&self.drives);
-            self.still.extend(axes.map(|(a, &drive)| AxisInstant {
-                position: a.position,
-                drive: Some(drive),
-                ..AxisInstant::default()
-            }));
-            self.recorder.push(&Instant {
-                time: row.time_s,
-                line: self.line,
-                mode: Mode::Still,
-                limit: Limit::Dwell,
-                speed: 0.0,
-                feed: None,
-                axes: &self.still,
-            });
+            self.still.extend(axes.map(|(a, &drive)| AxisInstant::standing(a.position, Some(drive))));
+            self.recorder.push(&Instant::standing(row.time_s, self.line, &self.still));
             return Ok(());
         };
         if self.walk.as_ref().is_none_or(|(table, _)| *table != place.table) {

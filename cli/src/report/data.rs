@@ -103,11 +103,16 @@ pub(super) fn speed_unit(report: &Report) -> &'static str {
 
 impl Data {
     pub(super) fn new(report: &Report) -> Self {
-        let legend: Vec<Limit> = report.motion.shares.iter().map(|s| s.limit).collect();
-        // A limit without a share ruled for no time; it is drawn as the last entry.
-        let index = |limit: &Limit| legend.iter().position(|l| l == limit).unwrap_or(legend.len());
         let t = &report.motion.traces;
         let p = &report.motion.picture;
+        let mut legend: Vec<Limit> = report.shares.iter().map(|s| s.limit).collect();
+        // Drives also wait for the next table, which no share counts.
+        for limit in t.limit.iter().chain(p.points.iter().map(|q| &q.limit)) {
+            if !legend.contains(limit) {
+                legend.push(*limit);
+            }
+        }
+        let index = |limit: &Limit| legend.iter().position(|l| l == limit).unwrap_or(0);
         let points = || p.points.iter();
         let coordinates = p.axes.len().min(3);
         let extent = (0..coordinates).map(|c| spread(points().map(|q| q.at[c]))).fold(0.0, f64::max);
@@ -135,7 +140,6 @@ impl Data {
                 .collect(),
             legend: legend
                 .iter()
-                .chain([&Limit::Free])
                 .map(|l| LegendData { label: l.words(&report.axes), colour: colour::of_limit(*l) })
                 .collect(),
             t: TraceData {
@@ -169,12 +173,14 @@ impl Data {
                 slow: points().map(|q| u8::from(q.slow)).collect(),
             },
             pins: report
-                .motion
                 .slow
                 .places
                 .iter()
                 .take(PINS)
-                .map(|p| [p.at[0], p.at[1], p.at[2], p.time])
+                .map(|place| {
+                    let at = |c: usize| p.axes.get(c).map_or(0.0, |&axis| place.slowest_at[axis]);
+                    [at(0), at(1), at(2), place.slowest_s]
+                })
                 .collect(),
             unit: speed_unit(report),
         }

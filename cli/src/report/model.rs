@@ -1,12 +1,13 @@
 //! Everything the report shows, as plain data.
 
+use planner::analysis::operations::Operation;
+use planner::analysis::shortfall::Shortfall;
 use planner::topp::problem::Binding;
-use serde::Serialize;
 
-use crate::json::{CertificateJson, NoteJson};
+use crate::json::{BusJson, CertificateJson, NoteJson};
 
 /// A report.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Report {
     /// File name of the part program.
     pub job: String,
@@ -30,6 +31,10 @@ pub struct Report {
     pub table: TableSize,
     /// The motion over time and along the path.
     pub motion: Motion,
+    /// Seconds ruled by each limit, longest first.
+    pub shares: Vec<Share>,
+    /// Where the programmed feed is not reached.
+    pub slow: SlowPlaces,
     /// How the drives did; `None` when the table was planned but not played.
     pub simulation: Option<Simulation>,
     /// How the plan was made.
@@ -39,7 +44,7 @@ pub struct Report {
 }
 
 /// Times of the whole job.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug)]
 pub struct Times {
     /// Motion and dwells [s].
     pub cycle_s: f64,
@@ -52,7 +57,7 @@ pub struct Times {
 }
 
 /// Tolerance in force, who set it, and what is proven.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Tolerance {
     /// Largest tolerance in force [mm].
     pub tolerance_mm: f64,
@@ -65,7 +70,7 @@ pub struct Tolerance {
 }
 
 /// What the program holds.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     /// Blocks with at least one word.
     pub blocks: u64,
@@ -86,7 +91,7 @@ pub struct Counts {
 }
 
 /// One axis and its limits.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Axis {
     /// Name.
     pub name: String,
@@ -107,7 +112,7 @@ pub struct Axis {
 }
 
 /// Bounds of one axis, per second^n in its unit.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     /// Largest |velocity|.
     pub velocity: f64,
@@ -117,32 +122,8 @@ pub struct Bounds {
     pub jerk: Option<f64>,
 }
 
-/// One operation of the program.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Operation {
-    /// Its name: the comment or tool change that opened it.
-    pub name: String,
-    /// Line of the program, from 1.
-    pub line: u32,
-    /// Time at feed [s].
-    pub feed_s: f64,
-    /// Time in rapids [s].
-    pub rapid_s: f64,
-    /// Time standing [s].
-    pub dwell_s: f64,
-    /// Length of the feed moves [mm].
-    pub feed_mm: f64,
-}
-
-impl Operation {
-    /// Everything [s].
-    pub fn seconds(&self) -> f64 {
-        self.feed_s + self.rapid_s + self.dwell_s
-    }
-}
-
 /// Stops of one cause.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Stops {
     /// Why.
     pub cause: String,
@@ -151,7 +132,7 @@ pub struct Stops {
 }
 
 /// The proof, per axis.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Certificate {
     /// The verdict and the worst ratios.
     pub verdict: CertificateJson,
@@ -160,7 +141,7 @@ pub struct Certificate {
 }
 
 /// Ratios of one axis.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug)]
 pub struct Ratios {
     /// Largest |velocity| / limit.
     pub velocity: f64,
@@ -171,7 +152,7 @@ pub struct Ratios {
 }
 
 /// Size of the feed tables.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct TableSize {
     /// Sections, each from rest to rest.
     pub sections: u64,
@@ -195,7 +176,7 @@ impl TableSize {
 }
 
 /// How the simulated drives did.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Simulation {
     /// Control tick [s].
     pub tick_s: f64,
@@ -205,12 +186,25 @@ pub struct Simulation {
     pub setpoint_hash: String,
     /// Largest distance between a set-point and the exact plan [counts].
     pub path_deviation_counts: f64,
+    /// Distance of the load from the path of the set-points; `None` without a linear axis.
+    pub contour: Option<ContourError>,
+    /// What crossed the bus.
+    pub bus: BusJson,
     /// One row per axis.
     pub axes: Vec<DriveEnd>,
 }
 
+/// Distance across the path between load and set-points, linear axes.
+#[derive(Clone, Copy, Debug)]
+pub struct ContourError {
+    /// Largest [mm].
+    pub max_mm: f64,
+    /// Root mean square [mm].
+    pub rms_mm: f64,
+}
+
 /// One simulated drive.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug)]
 pub struct DriveEnd {
     /// Where the program ends [counts].
     pub target_counts: i64,
@@ -234,7 +228,7 @@ impl DriveEnd {
 }
 
 /// How the plan was made.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Planning {
     /// Name of the solver.
     pub solver: String,
@@ -247,20 +241,16 @@ pub struct Planning {
 }
 
 /// The motion, thinned out for drawing; [`super::record::Recorder`] makes it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Motion {
     /// Over time.
     pub traces: Traces,
     /// Along the path.
     pub picture: Picture,
-    /// Seconds ruled by each limit, longest first.
-    pub shares: Vec<Share>,
-    /// Where the programmed feed is not reached.
-    pub slow: SlowPlaces,
 }
 
 /// What rules the speed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Limit {
     /// The programmed feed.
     Feed,
@@ -272,7 +262,7 @@ pub enum Limit {
     Jerk(u8),
     /// Starting from and coming to rest.
     Rest,
-    /// None within a thousandth.
+    /// None is reached.
     Free,
     /// The machine waits.
     Dwell,
@@ -308,7 +298,7 @@ impl Limit {
 }
 
 /// Seconds ruled by one limit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share {
     /// The limit.
     pub limit: Limit,
@@ -317,7 +307,7 @@ pub struct Share {
 }
 
 /// Quantities over time, as the lowest and highest value in each of a bounded number of intervals.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default)]
 pub struct Traces {
     /// Start of each interval [s].
     pub time: Vec<f64>,
@@ -338,7 +328,7 @@ pub struct Traces {
 }
 
 /// How the machine moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// It stands.
     Still,
@@ -349,7 +339,7 @@ pub enum Mode {
 }
 
 /// Quantities of one axis over time.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default)]
 pub struct AxisTraces {
     /// Velocity [unit/s].
     pub velocity: Envelope,
@@ -364,7 +354,7 @@ pub struct AxisTraces {
 }
 
 /// Lowest and highest value per interval.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Envelope {
     /// Lowest.
     pub lo: Vec<f64>,
@@ -373,7 +363,7 @@ pub struct Envelope {
 }
 
 /// The path as a line to draw.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default)]
 pub struct Picture {
     /// Which axes the coordinates are: two for a flat picture, three for a view in space.
     /// A single one is drawn over time.
@@ -383,7 +373,7 @@ pub struct Picture {
 }
 
 /// A corner of the drawn path; speed, mode and limit are those of the stretch that ends here.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PicturePoint {
     /// Position in the picture's axes.
     pub at: [f64; 3],
@@ -402,37 +392,12 @@ pub struct PicturePoint {
 }
 
 /// Where the programmed feed is not reached.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default)]
 pub struct SlowPlaces {
     /// The places that cost most, most costly first.
-    pub places: Vec<SlowPlace>,
-    /// Places not listed.
-    pub others: u64,
+    pub places: Vec<Shortfall>,
+    /// How many there are, listed or not.
+    pub count: u64,
     /// Seconds lost against the programmed feed, all places together.
-    pub lost_s: f64,
-}
-
-/// A stretch on which the programmed feed is not reached for one reason.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct SlowPlace {
-    /// First line of the program.
-    pub first_line: u32,
-    /// Last line of the program.
-    pub last_line: u32,
-    /// When it begins [s].
-    pub time: f64,
-    /// Position in the picture's axes where it is slowest.
-    pub at: [f64; 3],
-    /// Length [mm].
-    pub length_mm: f64,
-    /// Programmed feed [mm/s].
-    pub programmed: f64,
-    /// Lowest speed [mm/s].
-    pub lowest: f64,
-    /// Mean speed [mm/s].
-    pub mean: f64,
-    /// Why.
-    pub limit: Limit,
-    /// Seconds lost against the programmed feed.
     pub lost_s: f64,
 }

@@ -1,15 +1,12 @@
 //! Turns the stream of planned and simulated instants into a motion small enough to draw.
 //!
 //! Memory is bounded whatever the job's length: intervals are joined two by two when there are too many, path
-//! points are thinned and at the end simplified, and of the slow places only the most costly are kept.
+//! points are thinned and at the end simplified.
 
-use std::collections::BTreeMap;
+use planner::tolerances::FEED_REACHED;
 
 use super::envelope::every_other;
-use super::model::{
-    Axis, AxisTraces, Envelope, Limit, Mode, Motion, Picture, PicturePoint, Share, SlowPlace, SlowPlaces,
-    Traces,
-};
+use super::model::{Axis, AxisTraces, Envelope, Limit, Mode, Motion, Picture, PicturePoint, Traces};
 use super::simplify::simplify;
 
 /// Numbers that the traces of all axes together may hold; with about five characters each they keep the
@@ -21,15 +18,6 @@ const RAW_POINTS: usize = 1 << 18;
 
 /// Most path points drawn.
 const DRAWN_POINTS: usize = 16_000;
-
-/// Most slow places listed.
-const PLACES: usize = 40;
-
-/// Slower than this share of the programmed feed counts as not reaching it.
-const REACHED: f64 = 0.98;
-
-/// Longest step between two instants that still belongs to one motion [s]; a longer one is a wait.
-const LONGEST_STEP_S: f64 = 0.1;
 
 /// One instant of a job.
 #[derive(Clone, Debug)]
@@ -50,6 +38,13 @@ pub struct Instant<'a> {
     pub axes: &'a [AxisInstant],
 }
 
+impl<'a> Instant<'a> {
+    /// The machine waits.
+    pub fn standing(time: f64, line: u32, axes: &'a [AxisInstant]) -> Self {
+        Instant { time, line, mode: Mode::Still, limit: Limit::Dwell, speed: 0.0, feed: None, axes }
+    }
+}
+
 /// One instant of one axis, in its unit.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AxisInstant {
@@ -63,6 +58,13 @@ pub struct AxisInstant {
     pub jerk: f64,
     /// How the simulated drive did.
     pub drive: Option<DriveInstant>,
+}
+
+impl AxisInstant {
+    /// At rest.
+    pub fn standing(position: f64, drive: Option<DriveInstant>) -> Self {
+        AxisInstant { position, drive, ..AxisInstant::default() }
+    }
 }
 
 /// One instant of a simulated drive.
@@ -87,9 +89,6 @@ pub struct Recorder {
     points: Vec<PicturePoint>,
     /// Instants per kept point, and how many since the last one.
     thinning: (usize, usize),
-    shares: BTreeMap<Limit, f64>,
-    open: Option<SlowPlace>,
-    slow: SlowPlaces,
     position: f64,
     last: Option<PicturePoint>,
 }
@@ -109,9 +108,6 @@ impl Recorder {
             stride: (1, 0),
             points: Vec::new(),
             thinning: (1, 0),
-            shares: BTreeMap::new(),
-            open: None,
-            slow: SlowPlaces::default(),
             position: 0.0,
             last: None,
         }
@@ -119,7 +115,7 @@ impl Recorder {
 
     /// Records one instant.
     pub fn push(&mut self, now: &Instant<'_>) {
-        let slow = now.mode == Mode::Feed && now.feed.is_some_and(|f| now.speed < REACHED * f);
+        let slow = now.mode == Mode::Feed && now.feed.is_some_and(|f| now.speed < FEED_REACHED * f);
         let mut at = [0.0; 3];
         for (slot, &axis) in at.iter_mut().zip(&self.shown) {
             *slot = now.axes.get(axis).map_or(0.0, |a| a.position);
@@ -134,67 +130,11 @@ impl Recorder {
             slow,
         };
         if let Some(last) = self.last {
-            let step = (now.time - last.time).max(0.0);
-            let still = step > LONGEST_STEP_S && now.speed == 0.0 && last.speed == 0.0;
-            *self.shares.entry(if still { Limit::Dwell } else { now.limit }).or_insert(0.0) += step;
-            if let Some(limit) = self.traces.limit.last_mut().filter(|_| still) {
-                *limit = Limit::Dwell;
-            }
-            let moved = if still { 0.0 } else { 0.5 * (last.speed + now.speed) * step };
-            self.position += moved;
-            self.follow_slow(now, &point, step, moved);
+            self.position += 0.5 * (last.speed + now.speed) * (now.time - last.time).max(0.0);
         }
         self.trace(now);
         self.keep(point);
         self.last = Some(point);
-    }
-
-    /// Grows, closes or opens the slow place that the instant belongs to.
-    fn follow_slow(&mut self, now: &Instant<'_>, point: &PicturePoint, step: f64, moved: f64) {
-        let feed = now.feed.filter(|_| point.slow);
-        if let Some(open) = &mut self.open
-            && feed == Some(open.programmed)
-            && open.limit == now.limit
-        {
-            open.last_line = now.line;
-            open.length_mm += moved;
-            open.lost_s += step - moved / open.programmed;
-            // Until the place is closed `mean` holds its duration.
-            open.mean += step;
-            if now.speed < open.lowest {
-                open.lowest = now.speed;
-                open.at = point.at;
-            }
-            return;
-        }
-        self.close_slow();
-        if let Some(programmed) = feed.filter(|f| *f > 0.0) {
-            self.open = Some(SlowPlace {
-                first_line: now.line,
-                last_line: now.line,
-                time: now.time - step,
-                at: point.at,
-                length_mm: moved,
-                programmed,
-                lowest: now.speed,
-                mean: step,
-                limit: now.limit,
-                lost_s: step - moved / programmed,
-            });
-        }
-    }
-
-    fn close_slow(&mut self) {
-        let Some(mut place) = self.open.take() else { return };
-        place.mean = if place.mean > 0.0 { place.length_mm / place.mean } else { place.lowest };
-        self.slow.lost_s += place.lost_s;
-        let places = &mut self.slow.places;
-        let rank = places.partition_point(|p| p.lost_s >= place.lost_s);
-        places.insert(rank, place);
-        if places.len() > PLACES {
-            places.pop();
-            self.slow.others += 1;
-        }
     }
 
     fn trace(&mut self, now: &Instant<'_>) {
@@ -241,18 +181,13 @@ impl Recorder {
 
     /// The motion recorded.
     pub fn finish(mut self) -> Motion {
-        self.close_slow();
         if let Some(last) = self.last
             && self.points.last() != Some(&last)
         {
             self.points.push(last);
         }
-        let mut shares: Vec<Share> =
-            self.shares.iter().map(|(&limit, &seconds)| Share { limit, seconds }).collect();
-        shares.retain(|s| s.seconds > 0.0);
-        shares.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
         let picture = self.picture();
-        Motion { traces: self.traces, picture, shares, slow: self.slow }
+        Motion { traces: self.traces, picture }
     }
 
     /// Chooses the axes worth drawing and simplifies the line.
@@ -276,9 +211,6 @@ impl Recorder {
         };
         for point in &mut points {
             point.at = select(point.at);
-        }
-        for place in &mut self.slow.places {
-            place.at = select(place.at);
         }
         Picture {
             axes: moving.iter().map(|&c| self.shown[c]).collect(),

@@ -1,6 +1,7 @@
 //! The upper part of the report: headline numbers and plots.
 
 use maud::{Markup, html};
+use planner::tolerances::FEED_REACHED;
 
 use super::colour;
 use super::data::speed_unit;
@@ -91,6 +92,14 @@ pub(super) fn headline(report: &Report) -> Markup {
                     if all { "good" } else { "bad" },
                 ))
                 (card("Following error, simulated", &largest_error(report, &sim.axes), &rms_error(report, &sim.axes), ""))
+                @if let Some(c) = sim.contour {
+                    (card(
+                        "Contour error, simulated",
+                        &format!("{} mm", number(c.max_mm)),
+                        &format!("across the path, at most; rms {} mm", number(c.rms_mm)),
+                        "",
+                    ))
+                }
             }
         }
     }
@@ -161,7 +170,7 @@ pub(super) fn picture(report: &Report) -> Markup {
             }
             p.note {
                 "Rapids are dashed. "
-                span.halo { "Haloed" } " stretches run below 98 % of the programmed feed; numbers are the rows of the table below. "
+                span.halo { "Haloed" } " stretches run below " (percent(FEED_REACHED)) " of the programmed feed; numbers are the rows of the table below. "
                 "Drag a box to magnify, double-click to go back."
                 @if !hidden.is_empty() && axes.len() > 1 { " Not drawn: " (hidden.join(", ")) "." }
             }
@@ -171,7 +180,7 @@ pub(super) fn picture(report: &Report) -> Markup {
 
 /// Which limit rules for how long, and when.
 pub(super) fn limiting(report: &Report) -> Markup {
-    let shares = &report.motion.shares;
+    let shares = &report.shares;
     let total: f64 = shares.iter().map(|s| s.seconds).sum();
     if total <= 0.0 {
         return html! {};

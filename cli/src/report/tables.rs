@@ -1,10 +1,11 @@
 //! The lower part of the report: tables.
 
 use maud::{Markup, html};
+use planner::analysis::shortfall::Shortfall;
 
 use super::colour;
 use super::data::{PINS, speed_unit};
-use super::model::{Bounds, Report};
+use super::model::{Bounds, Limit, Report};
 use super::words::{bytes, count, duration, length, number, percent};
 
 /// Slow places shown at once; the others unfold.
@@ -12,7 +13,7 @@ const SHOWN: usize = PINS;
 
 /// Where the programmed feed is not reached, and why.
 pub(super) fn slow(report: &Report) -> Markup {
-    let slow = &report.motion.slow;
+    let slow = &report.slow;
     let unit = speed_unit(report);
     let (first, rest) = slow.places.split_at(slow.places.len().min(SHOWN));
     html! {
@@ -23,7 +24,7 @@ pub(super) fn slow(report: &Report) -> Markup {
             } @else {
                 p {
                     b { (duration(slow.lost_s)) } " are lost against the programmed feed, in "
-                    (count(slow.places.len() as u64 + slow.others)) " places. The most costly:"
+                    (count(slow.count)) " places. The most costly:"
                 }
                 (slow_table(report, first, 0, unit))
                 @if !rest.is_empty() {
@@ -37,7 +38,7 @@ pub(super) fn slow(report: &Report) -> Markup {
     }
 }
 
-fn slow_table(report: &Report, places: &[super::model::SlowPlace], from: usize, unit: &str) -> Markup {
+fn slow_table(report: &Report, places: &[Shortfall], from: usize, unit: &str) -> Markup {
     html! {
         div.scroll { table {
             thead { tr {
@@ -48,11 +49,12 @@ fn slow_table(report: &Report, places: &[super::model::SlowPlace], from: usize, 
                 tr {
                     td.n { (from + i + 1) }
                     td { (p.first_line) @if p.last_line != p.first_line { "\u{2013}" (p.last_line) } }
-                    td.n { (length(p.length_mm)) }
+                    td.n { (length(p.length)) }
                     td.n { (number(p.programmed)) " " (unit) }
                     td.n { (number(p.lowest)) }
                     td.n { (number(p.mean)) }
-                    td { i.swatch style=(format!("background:{}", colour::of_limit(p.limit))) {} (p.limit.words(&report.axes)) }
+                    @let limit = Limit::from(p.limit);
+                    td { i.swatch style=(format!("background:{}", colour::of_limit(limit))) {} (limit.words(&report.axes)) }
                     td.n { (duration(p.lost_s)) }
                 }
             } }
@@ -74,15 +76,15 @@ pub(super) fn operations(report: &Report) -> Markup {
                     } }
                     tbody { @for o in &report.operations {
                         tr {
-                            td.wide { (o.name) }
-                            td { (o.line) }
+                            td.wide { @if o.name.is_empty() { "before the first remark" } @else { (o.name) } }
+                            td { (o.line.max(1)) }
                             td.n { (duration(o.feed_s)) }
                             td.n { (duration(o.rapid_s)) }
                             td.n { (duration(o.dwell_s)) }
                             td.n { b { (duration(o.seconds())) } }
                             td.n { (percent(o.seconds() / total)) }
-                            td.n { (length(o.feed_mm)) }
-                            td.n { @if o.feed_s > 0.0 { (number(o.feed_mm / o.feed_s)) " mm/s" } @else { "\u{2013}" } }
+                            td.n { (length(o.feed_length_mm)) }
+                            td.n { @if o.feed_s > 0.0 { (number(o.feed_length_mm / o.feed_s)) " mm/s" } @else { "\u{2013}" } }
                         }
                     } }
                 } }
@@ -153,7 +155,13 @@ pub(super) fn proof(report: &Report) -> Markup {
                 p.note {
                     (count(sim.setpoints)) " set-points of all axes at " (number(sim.tick_s * 1e3)) " ms, hash "
                     code { (sim.setpoint_hash) } ", never more than " (number(sim.path_deviation_counts))
-                    " counts from the exact plan."
+                    " counts from the exact plan. "
+                    @if let Some(c) = sim.contour {
+                        "Across the path the load is never further than " (number(c.max_mm)) " mm from it, "
+                        (number(c.rms_mm)) " mm rms. "
+                    }
+                    (count(sim.bus.frames)) " frames with " (bytes(sim.bus.bytes)) " crossed the bus, which was busy "
+                    (percent(sim.bus.load)) " of the time."
                 }
             }
         }

@@ -1,6 +1,8 @@
 //! The command through its public door: verbs, files, report.
 
 #[cfg(test)]
+mod local;
+#[cfg(test)]
 mod report;
 #[cfg(test)]
 mod sample;

@@ -100,6 +100,10 @@ fn every_headline_and_table_is_there() {
         "Stops by cause",
         "Machine limits",
         "no physical drive was used",
+        "Contour error, simulated",
+        "crossed the bus",
+        "before the first remark",
+        "40 places",
         "allowed by the machine",
         "0.999998",
     ] {

@@ -3,12 +3,19 @@
 use std::f64::consts::TAU;
 
 use cli::engine::Outcome;
-use cli::json::{AxisJson, BoxJson, CertificateJson, FilesJson, NoteJson, PlanJson, SimulationJson};
+use cli::json::{
+    AxisJson, BindingJson, BoxJson, BusJson, CertificateJson, FeedNotReachedJson, FilesJson, NoteJson,
+    PlanJson, SimulationJson,
+};
 use cli::report::model::{
-    Axis, Bounds, Certificate, Counts, DriveEnd, Limit, Mode, Operation, Planning, Ratios, Report,
-    Simulation, Stops, TableSize, Times, Tolerance,
+    Axis, Bounds, Certificate, ContourError, Counts, DriveEnd, Limit, Mode, Planning, Ratios, Report, Share,
+    Simulation, SlowPlaces, Stops, TableSize, Times, Tolerance,
 };
 use cli::report::record::{AxisInstant, DriveInstant, Instant, Recorder};
+use planner::analysis::operations::Operation;
+use planner::analysis::shortfall::Shortfall;
+use planner::job::machine::MAX_AXES;
+use planner::topp::problem::Binding;
 
 /// Which axes the sample machine has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -233,25 +240,34 @@ pub(crate) fn report(kind: Kind, rounds: usize) -> Report {
             let position = still(0);
             let rest: Vec<AxisInstant> = position
                 .iter()
-                .map(|&position| AxisInstant {
-                    position,
-                    drive: Some(DriveInstant::default()),
-                    ..AxisInstant::default()
-                })
+                .map(|&position| AxisInstant::standing(position, Some(DriveInstant::default())))
                 .collect();
-            let (mode, limit) = (Mode::Still, Limit::Rest);
-            recorder.push(&Instant {
-                time,
-                line: curve.lines[1],
-                mode,
-                limit,
-                speed: 0.0,
-                feed: None,
-                axes: &rest,
-            });
+            recorder.push(&Instant::standing(time, curve.lines[1], &rest));
         }
     }
     finish(axes, recorder, time, motion_s)
+}
+
+const BUS: BusJson = BusJson { frames: 2120, bytes: 16_412, load: 0.031 };
+
+/// A place where the sample does not reach its feed.
+fn place(k: u32) -> Shortfall {
+    let mut slowest_at = [0.0; MAX_AXES];
+    (slowest_at[0], slowest_at[1]) = (30.0 + 10.0 * f64::from(k), 20.0 + 9.0 * f64::from(k));
+    Shortfall {
+        first_line: 100 * k + 7,
+        last_line: 100 * k + 9,
+        start_s: f64::from(k),
+        length: 3.2,
+        programmed: 110.0,
+        lowest: 61.0,
+        mean: 84.0,
+        slowest_s: f64::from(k) + 0.2,
+        slowest_at,
+        limit: Binding::Acceleration(0),
+        seconds: 0.038,
+        lost_s: 0.009,
+    }
 }
 
 fn finish(axes: Vec<Axis>, recorder: Recorder, cycle_s: f64, motion_s: f64) -> Report {
@@ -262,7 +278,8 @@ fn finish(axes: Vec<Axis>, recorder: Recorder, cycle_s: f64, motion_s: f64) -> R
         feed_s: share * motion_s * 0.8,
         rapid_s: share * motion_s * 0.2,
         dwell_s: 0.0,
-        feed_mm: share * motion_s * 40.0,
+        feed_length_mm: share * motion_s * 40.0,
+        rapid_length_mm: share * motion_s * 10.0,
     };
     let ratios = |k: usize| Ratios {
         velocity: 0.91 - 0.2 * k as f64,
@@ -309,7 +326,8 @@ fn finish(axes: Vec<Axis>, recorder: Recorder, cycle_s: f64, motion_s: f64) -> R
             rapid_mm: 441.2,
         },
         operations: vec![
-            operation("T1 6 mm end mill: contour", 5, 0.62),
+            operation("", 0, 0.02),
+            operation("T1 6 mm end mill: contour", 5, 0.60),
             operation("T2 engraver: wave", 1210, 0.38),
         ],
         stops: stops.map(|(cause, count)| Stops { cause: cause.into(), count }).to_vec(),
@@ -329,13 +347,23 @@ fn finish(axes: Vec<Axis>, recorder: Recorder, cycle_s: f64, motion_s: f64) -> R
             geometry_spans: 1633,
             shared: 8315,
             axes: (0..n as u64).map(|k| 4910 - 310 * k).collect(),
+            headers: 720,
         },
         motion: recorder.finish(),
+        shares: vec![
+            Share { limit: Limit::Acceleration(0), seconds: 0.6 * motion_s },
+            Share { limit: Limit::Feed, seconds: 0.3 * motion_s },
+            Share { limit: Limit::Rest, seconds: 0.1 * motion_s },
+            Share { limit: Limit::Dwell, seconds: cycle_s - motion_s },
+        ],
+        slow: SlowPlaces { places: (0..14).map(place).collect(), count: 40, lost_s: 0.1 * motion_s },
         simulation: Some(Simulation {
             tick_s: TICK_S,
             setpoints: n as u64 * (cycle_s / TICK_S) as u64,
             setpoint_hash: "9f2c4411d07be83a".into(),
             path_deviation_counts: 0.62,
+            contour: Some(ContourError { max_mm: 0.0021, rms_mm: 0.0004 }),
+            bus: BUS,
             axes: (0..n).map(end).collect(),
         }),
         planning: Planning {
@@ -358,6 +386,9 @@ pub(crate) fn outcome(simulated: bool) -> Outcome {
         max_path_deviation_counts: 0.62,
         max_following_error_mm: 0.0041,
         rms_following_error_mm: 0.00082,
+        max_contour_error_mm: 0.0021,
+        rms_contour_error_mm: 0.0004,
+        bus: BUS,
         at_end: true,
         real_time_factor: 61.0,
     };
@@ -376,6 +407,7 @@ pub(crate) fn outcome(simulated: bool) -> Outcome {
         splines: c.splines,
         dwells: c.dwells,
         stops: 11,
+        stops_by_cause: [("program_end", 1), ("rapid", 8), ("reversal", 1), ("tool_change", 1)].into(),
         feed_length_mm: c.feed_mm,
         rapid_length_mm: c.rapid_mm,
         bounding_box_mm: BoxJson { min: vec![0.0, 0.0], max: vec![180.0, 205.0] },
@@ -386,11 +418,28 @@ pub(crate) fn outcome(simulated: bool) -> Outcome {
         motion_time_s: report.times.motion_s,
         constant_feed_time_s: report.times.constant_feed_s,
         stop_every_block_time_s: report.times.stop_every_block_s,
+        binding: vec![
+            BindingJson { kind: "jerk", axis: Some("X".into()), seconds: 7.0, share: 0.7 },
+            BindingJson { kind: "feed", axis: None, seconds: 3.0, share: 0.3 },
+        ],
+        feed_not_reached: vec![FeedNotReachedJson {
+            first_line: 7,
+            last_line: 9,
+            length_mm: 3.2,
+            programmed_mm_s: 110.0,
+            lowest_mm_s: 61.0,
+            mean_mm_s: 84.0,
+            limited_by: "acceleration",
+            axis: Some("X".into()),
+            lost_s: 0.009,
+        }],
+        operations: report.operations.clone(),
         spans: report.table.spans,
         table_bytes: report.table.total(),
         plan_seconds: 0.412,
         peak_memory_mib: Some(48.0),
         solver: "interior-point".into(),
+        iterations: report.planning.iterations,
         certificate: report.certificate.verdict,
         simulation: simulated.then_some(simulation),
         notes: report.notes.clone(),

@@ -1,5 +1,6 @@
 //! The verbs on a scripted engine: files, streams, exit status, JSON.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -48,7 +49,7 @@ impl Engine for Scripted {
     }
 
     fn run(&self, args: &RunArgs, trace: &mut dyn Write, _: &mut Progress) -> Result<Outcome, Failure> {
-        writeln!(trace, "every,{}", args.trace_every).map_err(|e| Failure::internal(e.to_string()))?;
+        writeln!(trace, "every,{:?}", args.trace_every).map_err(|e| Failure::internal(e.to_string()))?;
         self.outcome(true)
     }
 
@@ -62,6 +63,8 @@ impl Engine for Scripted {
             motion_time_s: 1.5,
             certificate: self.certificate(),
             axes: vec![axis],
+            fault_count: if self.holds { 0 } else { 3 },
+            faults: if self.holds { Vec::new() } else { vec!["table 1, line 9: jerk".into()] },
             verify_seconds: 0.01,
         })
     }
@@ -133,7 +136,7 @@ fn run_writes_table_plan_report_and_trace() {
     let said = say(&GOOD, &["run", "jobs/part.ngc", "-o", folder.to_str().unwrap(), "--trace-every", "4"]);
     assert_eq!((said.status, said.err.as_str()), (0, ""));
     assert_eq!(names(&folder), ["part.feed", "plan.json", "report.html", "trace.csv"]);
-    assert_eq!(fs::read_to_string(folder.join("trace.csv")).unwrap(), "every,4\n");
+    assert_eq!(fs::read_to_string(folder.join("trace.csv")).unwrap(), "every,Some(4)\n");
     assert_eq!(fs::read(folder.join("part.feed")).unwrap(), b"a feed table");
     assert!(said.out.contains("cycle time") && said.out.contains("report.html"), "{}", said.out);
 }
@@ -151,10 +154,10 @@ fn field_names_of_plan_and_run_are_pinned() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().to_str().unwrap();
     let run = json(&say(&GOOD, &["run", "part.ngc", "--json", "-o", folder]));
-    let mut expected: Vec<&str> = "job machine axes blocks rapids lines arcs splines dwells stops feed_length_mm \
+    let mut expected: Vec<&str> = "job machine axes blocks rapids lines arcs splines dwells stops stops_by_cause feed_length_mm \
         rapid_length_mm bounding_box_mm tolerance_mm tolerance_source max_deviation_mm cycle_time_s motion_time_s \
-        constant_feed_time_s stop_every_block_time_s spans table_bytes plan_seconds peak_memory_mib solver \
-        certificate simulation notes files"
+        constant_feed_time_s stop_every_block_time_s binding feed_not_reached operations spans table_bytes plan_seconds \
+        peak_memory_mib solver iterations certificate simulation notes files"
         .split_whitespace()
         .collect();
     expected.sort_unstable();
@@ -164,11 +167,30 @@ fn field_names_of_plan_and_run_are_pinned() {
     assert_eq!(keys(&run["bounding_box_mm"]), ["max", "min"]);
     let ratios = ["acceleration_ratio", "feed_ratio", "holds", "jerk_ratio", "velocity_ratio"];
     assert_eq!(keys(&run["certificate"]), ratios);
+    assert_eq!(keys(&run["binding"][0]), ["axis", "kind", "seconds", "share"]);
+    let place = [
+        "axis",
+        "first_line",
+        "last_line",
+        "length_mm",
+        "limited_by",
+        "lost_s",
+        "lowest_mm_s",
+        "mean_mm_s",
+        "programmed_mm_s",
+    ];
+    assert_eq!(keys(&run["feed_not_reached"][0]), place);
+    let operation = ["dwell_s", "feed_length_mm", "feed_s", "line", "name", "rapid_length_mm", "rapid_s"];
+    assert_eq!(keys(&run["operations"][0]), operation);
+    assert_eq!(keys(&run["simulation"]["bus"]), ["bytes", "frames", "load"]);
     let simulation = [
         "at_end",
+        "bus",
+        "max_contour_error_mm",
         "max_following_error_mm",
         "max_path_deviation_counts",
         "real_time_factor",
+        "rms_contour_error_mm",
         "rms_following_error_mm",
         "setpoint_hash",
         "setpoints",
@@ -182,8 +204,8 @@ fn field_names_of_plan_and_run_are_pinned() {
 #[test]
 fn field_names_of_verify_and_inspect_are_pinned() {
     let verify = json(&say(&GOOD, &["verify", "a.feed", "--json"]));
-    let expected = ["axes", "certificate", "file", "motion_time_s", "sections", "spans", "verify_seconds"];
-    assert_eq!(keys(&verify), expected);
+    let expected = "axes certificate fault_count faults file motion_time_s sections spans verify_seconds";
+    assert_eq!(keys(&verify), expected.split_whitespace().collect::<Vec<_>>());
     let axis = ["acceleration_ratio", "jerk_ratio", "name", "velocity_ratio"];
     assert_eq!(keys(&verify["axes"][0]), axis);
     let inspect = json(&say(&GOOD, &["inspect", "a.feed", "--json"]));
@@ -194,27 +216,38 @@ fn field_names_of_verify_and_inspect_are_pinned() {
     assert_eq!(keys(&inspect["axes"][0]), axis);
 }
 
+/// The names of all fields of an object and of what it holds.
+fn fields(value: &Value, found: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(map) => {
+            for (key, inner) in map {
+                found.insert(key.clone());
+                fields(inner, found);
+            }
+        }
+        Value::Array(list) => list.iter().for_each(|inner| fields(inner, found)),
+        _ => {}
+    }
+}
+
 #[test]
-fn every_field_is_explained_in_the_documentation() {
+fn the_documentation_explains_every_field_and_no_other() {
     let text = include_str!("../../../docs/json.md");
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().to_str().unwrap();
-    fn check(value: &Value, text: &str) {
-        match value {
-            Value::Object(map) => {
-                for (key, inner) in map {
-                    assert!(text.contains(&format!("`{key}`")), "docs/json.md does not explain {key}");
-                    check(inner, text);
-                }
-            }
-            Value::Array(list) => list.iter().for_each(|inner| check(inner, text)),
-            _ => {}
-        }
+    let mut found = BTreeSet::new();
+    fields(&json(&say(&GOOD, &["run", "part.ngc", "--json", "-o", folder])), &mut found);
+    fields(&json(&say(&GOOD, &["verify", "a.feed", "--json"])), &mut found);
+    fields(&json(&say(&GOOD, &["inspect", "a.feed", "--json"])), &mut found);
+    fields(&json(&say(&BAD_INPUT, &["plan", "part.ngc", "--json", "-o", folder])), &mut found);
+    for name in &found {
+        assert!(text.contains(&format!("`{name}`")), "docs/json.md does not explain {name}");
     }
-    check(&json(&say(&GOOD, &["run", "part.ngc", "--json", "-o", folder])), text);
-    check(&json(&say(&GOOD, &["verify", "a.feed", "--json"])), text);
-    check(&json(&say(&GOOD, &["inspect", "a.feed", "--json"])), text);
-    check(&json(&say(&BAD_INPUT, &["plan", "part.ngc", "--json", "-o", folder])), text);
+    // The first cell of a row holds names in backticks.
+    let rows = text.lines().filter_map(|line| line.strip_prefix("| `")?.split('|').next());
+    for name in rows.flat_map(|cell| cell.split('`').step_by(2)) {
+        assert!(found.contains(name), "docs/json.md explains {name}, which does not exist");
+    }
 }
 
 #[test]
@@ -252,7 +285,18 @@ fn a_broken_certificate_is_status_one_with_a_report_and_no_table() {
     assert_eq!(said.status, 1);
     assert_eq!(names(home.path()), ["plan.json", "report.html"]);
     assert!(said.out.contains("DOES NOT HOLD"), "{}", said.out);
-    assert_eq!(say(&BROKEN, &["verify", "a.feed"]).status, 1);
+}
+
+#[test]
+fn verify_says_what_does_not_hold() {
+    let said = say(&BROKEN, &["verify", "a.feed"]);
+    assert_eq!(said.status, 1);
+    assert!(said.out.contains("  fault               table 1, line 9: jerk\n"), "{}", said.out);
+    assert!(said.out.contains("and 2 more"), "{}", said.out);
+    let told = json(&say(&BROKEN, &["verify", "a.feed", "--json"]));
+    assert_eq!((&told["fault_count"], &told["faults"][0]), (&3.into(), &"table 1, line 9: jerk".into()));
+    let sound = say(&GOOD, &["verify", "a.feed"]);
+    assert!(sound.status == 0 && !sound.out.contains("fault"), "{}", sound.out);
 }
 
 #[test]

@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
-
 use super::cells::{feed_ratio, nearest_limit};
 use super::motion::{AxisState, MotionSpan, pieces, spans};
 use crate::feed::job::PlannedSection;
@@ -22,55 +20,56 @@ pub struct BindingShares {
 }
 
 /// One limit's share of the motion.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share {
-    /// velocity, acceleration, jerk, feed, rest or free.
-    pub kind: &'static str,
-    /// The axis, where an axis limit rules.
-    pub axis: Option<u8>,
-    /// How long [s].
+    /// The limit.
+    pub limit: Binding,
+    /// How long it rules [s].
     pub seconds: f64,
     /// Of all motion time.
     pub share: f64,
 }
 
 impl BindingShares {
-    /// Adds one section.
-    ///
-    /// What rules is read off the table itself: a span counts for the limit that comes nearest to being reached
-    /// anywhere on it, if it is reached to within [`BINDING`]. A quadratic q cannot hold a limit all along a
-    /// span, so the places within a span do not count one by one.
-    pub fn add(&mut self, section: &PlannedSection) {
-        let table = &section.table;
-        let last = table.spans().saturating_sub(1);
-        let (mut geometry, mut cubics) = (usize::MAX, Vec::new());
-        for span in spans(table) {
-            if span.geometry != geometry {
-                geometry = span.geometry;
-                cubics = pieces(table, geometry);
-            }
-            let rests = span.index == 0 || span.index == last;
-            let binding = if rests { Binding::Rest } else { ruling(section, &span, &cubics) };
-            *self.seconds.entry(binding).or_insert(0.0) += span.duration_s;
+    /// Adds one section, given what [`rulings`] says of it.
+    pub fn add(&mut self, section: &PlannedSection, rulings: &[Binding]) {
+        for (span, &limit) in spans(&section.table).zip(rulings) {
+            *self.seconds.entry(limit).or_insert(0.0) += span.duration_s;
         }
     }
 
-    /// Adds what another collected.
-    pub fn merge(&mut self, other: &Self) {
-        for (&binding, &seconds) in &other.seconds {
-            *self.seconds.entry(binding).or_insert(0.0) += seconds;
-        }
-    }
-
-    /// The shares, in the order velocity, acceleration, jerk (each by axis), feed, rest, free.
+    /// The shares, the longest first.
     pub fn shares(&self) -> Vec<Share> {
         let total: f64 = self.seconds.values().sum();
-        let share = |(&binding, &seconds): (&Binding, &f64)| {
-            let (kind, axis) = name(binding);
-            Share { kind, axis, seconds, share: if total > 0.0 { seconds / total } else { 0.0 } }
-        };
-        self.seconds.iter().map(share).collect()
+        let mut shares: Vec<Share> = self
+            .seconds
+            .iter()
+            .filter(|&(_, &seconds)| seconds > 0.0)
+            .map(|(&limit, &seconds)| Share { limit, seconds, share: seconds / total })
+            .collect();
+        shares.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
+        shares
     }
+}
+
+/// What rules each span of a section, read off its table.
+///
+/// A span counts for the limit that comes nearest to being reached anywhere on it, if it is reached to within
+/// [`BINDING`]. A quadratic q cannot hold a limit all along a span, so the places within a span do not count one
+/// by one.
+pub fn rulings(section: &PlannedSection) -> Vec<Binding> {
+    let table = &section.table;
+    let last = table.spans().saturating_sub(1);
+    let (mut geometry, mut cubics) = (usize::MAX, Vec::new());
+    let rule = |span: MotionSpan| {
+        if span.geometry != geometry {
+            geometry = span.geometry;
+            cubics = pieces(table, geometry);
+        }
+        let rests = span.index == 0 || span.index == last;
+        if rests { Binding::Rest } else { ruling(section, &span, &cubics) }
+    };
+    spans(table).map(rule).collect()
 }
 
 /// What rules an inner span.
@@ -118,21 +117,24 @@ mod tests {
     use crate::geometry::section::SpeedCap;
     use crate::job::machine::AxisLimits;
 
-    fn kinds(section: &PlannedSection) -> Vec<Share> {
+    fn shares(section: &PlannedSection) -> Vec<Share> {
         let mut shares = BindingShares::default();
-        shares.add(section);
+        shares.add(section, &rulings(section));
         shares.shares()
     }
 
     #[test]
     fn shares_sum_to_one_and_rest_spans_count_as_rest() {
         let section = bent_section();
-        let shares = kinds(&section);
-        assert!((shares.iter().map(|s| s.share).sum::<f64>() - 1.0).abs() < 1e-12);
-        assert_eq!(shares.iter().map(|s| s.kind).collect::<Vec<_>>(), ["rest", "free"]);
+        let found = shares(&section);
+        assert!((found.iter().map(|s| s.share).sum::<f64>() - 1.0).abs() < 1e-12);
+        assert!(found.windows(2).all(|w| w[0].seconds >= w[1].seconds));
         let n = section.table.spans();
         let rest = section.table.law(0).duration() + section.table.law(n - 1).duration();
-        assert!((shares[0].seconds - rest).abs() < 1e-9);
+        let of = |limit| found.iter().find(|s| s.limit == limit).map_or(0.0, |s| s.seconds);
+        assert!((of(Binding::Rest) - rest).abs() < 1e-9);
+        assert!((of(Binding::Free) - (section.table.duration() - rest)).abs() < 1e-9);
+        assert_eq!(BindingShares::default().shares(), []);
     }
 
     #[test]
@@ -142,9 +144,9 @@ mod tests {
         let unit = AxisLimits { velocity: 1.0, acceleration: f64::INFINITY, jerk: f64::INFINITY };
         let top = certify(table, &[unit; 2], &[]).velocity_ratio;
         section.limits = vec![AxisLimits { velocity: top, ..unit }; 2];
-        assert!(kinds(&section).iter().any(|s| s.kind == "velocity" && s.axis == Some(0)));
+        assert!(rulings(&section).contains(&Binding::Velocity(0)));
         let speed = certify(table, &[unit; 2], &section.marks.caps).feed_ratio * 25.0;
         section.marks.caps[0].speed = SpeedCap::Tangential { axes: 3, speed };
-        assert!(kinds(&section).iter().any(|s| s.kind == "feed" && s.axis.is_none()));
+        assert!(rulings(&section).contains(&Binding::Feed));
     }
 }

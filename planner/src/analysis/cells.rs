@@ -15,6 +15,8 @@ pub struct Cell<'a> {
     pub rests: bool,
     /// Start and end on the path [u].
     pub range: [f64; 2],
+    /// When it starts, from the start of the section [s].
+    pub start_s: f64,
     /// Time to cross it [s].
     pub seconds: f64,
     /// The speed cap in force.
@@ -70,6 +72,7 @@ pub fn visit(section: &PlannedSection, per_span: usize, mut see: impl FnMut(&Cel
                     span: span.index,
                     rests: span.index == 0 || span.index == last,
                     range: [start + a, start + b],
+                    start_s: span.start_s + span.time_at(a),
                     seconds: crossing(&span, a, b),
                     cap: speed_cap,
                     line,
@@ -134,6 +137,7 @@ mod tests {
         let (mut end, mut seconds, mut lines) = (0.0, 0.0, Vec::new());
         visit(&section, 3, |cell| {
             assert!((cell.range[0] - end).abs() < 1e-12 && cell.range[1] > cell.range[0]);
+            assert!((cell.start_s - seconds).abs() < 1e-9);
             end = cell.range[1];
             seconds += cell.seconds;
             assert_eq!(cell.line, if end <= 300.0 / 64.0 + 1e-9 { 4 } else { 5 });

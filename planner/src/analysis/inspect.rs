@@ -153,8 +153,8 @@ fn summarise_axis(table: &FeedTable, axis: usize) -> AxisSummary {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::motion::Cursor;
     use crate::analysis::samples::{back_section, bent_section};
-    use crate::analysis::series::sample;
 
     #[test]
     fn totals_are_sums_and_peaks_are_those_of_the_motion() {
@@ -172,12 +172,14 @@ mod tests {
         assert_eq!(first.lines, [4, 5]);
         assert_eq!(first.axes[0].ends, [0.0, 9.3]);
         let mut most = [0.0f64; 3];
-        sample(&section, 50, |now| {
-            let a = now.axes[0];
+        let (mut cursor, duration) = (Cursor::new(&section.table), section.table.duration());
+        for k in 0..=20_000 {
+            let state = cursor.seek(duration * f64::from(k) / 20_000.0);
+            let a = cursor.axes(&state).next().unwrap();
             for (m, x) in most.iter_mut().zip([a.velocity, a.acceleration, a.jerk]) {
                 *m = m.max(x.abs());
             }
-        });
+        }
         for (proven, sampled) in first.axes[0].largest.iter().zip(most) {
             assert!(*proven >= sampled * (1.0 - 1e-12) && *proven < sampled * 1.01, "{proven} {sampled}");
         }

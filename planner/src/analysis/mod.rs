@@ -9,5 +9,4 @@ pub mod motion;
 pub mod operations;
 #[cfg(test)]
 pub(crate) mod samples;
-pub mod series;
 pub mod shortfall;

@@ -52,23 +52,35 @@ pub struct MotionSpan {
 
 /// The spans of a table in order, with their places in time and on the path.
 pub fn spans(table: &FeedTable) -> impl Iterator<Item = MotionSpan> {
-    let (mut from, mut start_s, mut geometry) = (0u64, 0.0, 0);
-    let breaks = &table.path.breaks;
-    (0..table.spans()).map(move |index| {
-        let to = from + u64::from(table.steps[index]);
+    let first = (table.spans() > 0).then(|| MotionSpan::first(table));
+    std::iter::successors(first, |span| span.following(table))
+}
+
+impl MotionSpan {
+    /// The first span of a table, which has at least one.
+    fn first(table: &FeedTable) -> Self {
+        Self::starting(table, 0, 0, 0.0, 0)
+    }
+
+    /// The span after this one.
+    fn following(&self, table: &FeedTable) -> Option<Self> {
+        let index = self.index + 1;
+        let start_s = self.start_s + self.duration_s;
+        (index < table.spans()).then(|| Self::starting(table, index, self.to, start_s, self.geometry))
+    }
+
+    /// Span `index`, where its start is known; its geometry span is `geometry` or a later one.
+    fn starting(table: &FeedTable, index: usize, from: u64, start_s: f64, mut geometry: usize) -> Self {
+        let breaks = &table.path.breaks;
         while geometry + 2 < breaks.len() && breaks[geometry + 1] <= from {
             geometry += 1;
         }
         let law = table.law(index);
-        let duration_s = law.duration();
+        let (to, duration_s) = (from + u64::from(table.steps[index]), law.duration());
         let offset = (from - breaks[geometry]) as f64 * table.path.step;
-        let span = MotionSpan { index, from, to, start_s, duration_s, law, geometry, offset };
-        (from, start_s) = (to, start_s + duration_s);
-        span
-    })
-}
+        Self { index, from, to, start_s, duration_s, law, geometry, offset }
+    }
 
-impl MotionSpan {
     /// Length in u.
     pub fn length(&self) -> f64 {
         match self.law {
@@ -137,6 +149,48 @@ impl MotionSpan {
 /// The cubics of all axes on one geometry span.
 pub fn pieces(table: &FeedTable, geometry: usize) -> Vec<Piece> {
     (0..table.path.axes.len()).map(|axis| table.path.piece(axis, geometry)).collect()
+}
+
+/// A place in a table that moves forwards in time.
+#[derive(Clone, Debug)]
+pub struct Cursor<'a> {
+    table: &'a FeedTable,
+    span: MotionSpan,
+    cubics: Vec<Piece>,
+}
+
+impl<'a> Cursor<'a> {
+    /// At the start of `table`, which has at least one span.
+    pub fn new(table: &'a FeedTable) -> Self {
+        let span = MotionSpan::first(table);
+        let cubics = pieces(table, span.geometry);
+        Self { table, span, cubics }
+    }
+
+    /// Moves to the time `time_s` after the start of the table [s], not before that of the call before; times
+    /// past the end stand at the end. The state's `x` counts from the start of [`Self::span`].
+    pub fn seek(&mut self, time_s: f64) -> PathState {
+        while time_s >= self.span.start_s + self.span.duration_s
+            && let Some(next) = self.span.following(self.table)
+        {
+            if next.geometry != self.span.geometry {
+                self.cubics = pieces(self.table, next.geometry);
+            }
+            self.span = next;
+        }
+        self.span.at_time((time_s - self.span.start_s).clamp(0.0, self.span.duration_s))
+    }
+
+    /// The span that it is in.
+    pub fn span(&self) -> &MotionSpan {
+        &self.span
+    }
+
+    /// The axes in order at the state that [`Self::seek`] has given.
+    pub fn axes(&self, state: &PathState) -> impl Iterator<Item = AxisState> {
+        let grid = self.table.path.axes.iter();
+        self.cubics.iter().zip(grid).map(|(cubic, axis)| self.span.axis(cubic, axis.lsb, state))
+    }
 }
 
 fn launch(h: f64, duration: f64, tau: f64) -> PathState {
@@ -213,6 +267,50 @@ mod tests {
                     assert!((slope(a.velocity, c.velocity) - b.acceleration).abs() < 1e-5);
                     assert!((slope(a.acceleration, c.acceleration) - b.jerk).abs() < 1e-4);
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn way_solves_the_differential_equation() {
+        // d2x/dt2 = q'(x)/2, by central differences.
+        for span in spans(&bent_table()) {
+            let SpanLaw::Quadratic { q, .. } = span.law else { continue };
+            let (t, d) = (0.4 * span.duration_s, 1e-3 * span.duration_s);
+            let [a, b, c] = [t - d, t, t + d].map(|t| span.at_time(t).x);
+            let expected = 0.5 * q[1] + q[2] * b;
+            assert!(((a - 2.0 * b + c) / (d * d) - expected).abs() < 1e-5 * (1.0 + expected.abs()));
+        }
+    }
+
+    #[test]
+    fn a_cursor_runs_continuously_from_end_to_end_and_stands_beyond() {
+        let table = bent_table();
+        let mut cursor = Cursor::new(&table);
+        let (end, mut last) = (table.duration(), 0.0);
+        for k in 0..=10_000 {
+            let state = cursor.seek(end * f64::from(k) / 10_000.0);
+            let x = cursor.axes(&state).next().unwrap().position;
+            assert!(x >= last && x - last < 0.003, "jump at {k}: {last} {x}");
+            last = x;
+        }
+        assert!((last - 9.3).abs() < 1e-12);
+        let state = cursor.seek(end + 1.0);
+        let axes: Vec<AxisState> = cursor.axes(&state).collect();
+        assert!((axes[0].position - 9.3).abs() < 1e-12 && (axes[1].position - 6.4).abs() < 1e-12);
+        assert_eq!((axes[0].velocity, cursor.span().to), (0.0, 640));
+    }
+
+    #[test]
+    fn a_cursor_sees_what_the_spans_hold() {
+        let table = bent_table();
+        let mut cursor = Cursor::new(&table);
+        for span in spans(&table) {
+            let state = cursor.seek(span.start_s + 0.3 * span.duration_s);
+            assert_eq!(*cursor.span(), span);
+            let cubics = pieces(&table, span.geometry);
+            for ((seen, cubic), axis) in cursor.axes(&state).zip(&cubics).zip(&table.path.axes) {
+                assert_eq!(seen, span.axis(cubic, axis.lsb, &state));
             }
         }
     }
