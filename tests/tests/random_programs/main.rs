@@ -80,6 +80,9 @@ fn random_programs_hold() {
     let mut findings: BTreeMap<&str, u32> = BTreeMap::new();
     for number in 0..cases {
         let mut tree = strategy.new_tree(&mut runner).unwrap();
+        if number < setting("FEEDSPLINE_FROM", 0) || setting("FEEDSPLINE_SAMPLES", 0) == 1 && tree.current().frame.axes > 1 {
+            continue;
+        }
         let begin = std::time::Instant::now();
         let outcome = tree.current().outcome();
         if begin.elapsed().as_secs_f64() > 5.0 {
@@ -105,7 +108,7 @@ fn random_programs_hold() {
                 _ => simpler = tree.complicate(),
             }
         }
-        println!("== {finding}\njerk limited: {}\n{}\n{}", best.jerk, best.frame.toml(), best.text());
+        println!("== {finding}\n{best:?}\n{}\n{}", best.frame.toml().lines().next().unwrap_or_default(), best.text());
     }
     assert!(findings.is_empty(), "{findings:?} of {cases}");
 }
