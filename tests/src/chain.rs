@@ -6,9 +6,9 @@ use host_sim::trace::PlotTrace;
 use planner::analysis::comparison::Comparison;
 use planner::geometry::sections::{PathSettings, SectionError, sections};
 use planner::job::gcode::{Counters, Options, Program, ProgramError};
-use planner::job::machine::Machine;
+use planner::job::machine::{LimitSet, Machine};
 use planner::job::program::{Item, Move};
-use planner::pipeline::{self, JobError, JobPlan, LimitSet};
+use planner::pipeline::{self, JobError, JobPlan};
 use planner::topp::problem::Settings;
 
 /// Why a program has no plan.
@@ -42,7 +42,7 @@ pub fn plan(
     let mut program = Program::new(text, "part.ngc", machine, options.clone());
     let mut items = Vec::new();
     let seen = program.by_ref().inspect(|item| items.extend(item.as_ref().ok().cloned()));
-    let mut stream = sections(seen, machine, &PathSettings::of(machine));
+    let mut stream = sections(seen, machine, &PathSettings::of(machine, limits));
     let plan = pipeline::plan(&mut stream, machine, limits, &Settings::default(), &mut |_| ())?;
     drop(stream);
     let mut comparison = Comparison::new(&machine.axes);

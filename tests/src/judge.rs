@@ -3,8 +3,8 @@
 use std::fmt;
 
 use planner::certificate::verify::verify;
-use planner::feed::file::{FeedWriter, FileHeader};
 use planner::feed::file::FeedReader;
+use planner::feed::file::{FeedWriter, FileHeader};
 use planner::feed::job::JobItem;
 use planner::feed::pack::{TableBytes, pack};
 use planner::job::machine::Machine;
@@ -144,7 +144,8 @@ fn file(chain: &Chain, header: &FileHeader) -> Result<(), Finding> {
         return found("file", "what is read is not what was written");
     }
     let mut axes = read.header.axes.clone();
-    let free = |i: &JobItem| matches!(i, JobItem::Section(s) if s.limits.iter().any(|l| l.jerk.is_infinite()));
+    let free =
+        |i: &JobItem| matches!(i, JobItem::Section(s) if s.limits.iter().any(|l| l.jerk.is_infinite()));
     if read.items.iter().any(free) {
         for axis in &mut axes {
             (axis.limits.jerk, axis.rapid.jerk) = (f64::INFINITY, f64::INFINITY);

@@ -215,7 +215,8 @@ impl Ruler {
         let (least_mm, least_rotary) = (count(&linear), count(&rotary));
         let machine_mm = machine.tolerance_mm.max(least_mm);
         let machine_rotary = machine.tolerance_rotary.max(least_rotary);
-        let floor = least_mm.max(if rotary.is_empty() { 0.0 } else { least_rotary * machine_mm / machine_rotary });
+        let floor =
+            least_mm.max(if rotary.is_empty() { 0.0 } else { least_rotary * machine_mm / machine_rotary });
         let tolerance_mm = asked.max(floor);
         let tolerance_rotary = machine_rotary * (tolerance_mm / machine_mm).min(1.0);
         Self { linear, rotary, tolerance_mm, tolerance_rotary }

@@ -17,16 +17,8 @@ pub struct Frame {
 }
 
 /// Sets of axes; the empty ones stand for the sample machines.
-const AXES: [&[&str]; 8] = [
-    &[],
-    &[],
-    &["X", "Y", "Z"],
-    &["X"],
-    &["X", "Y"],
-    &["X", "Z"],
-    &["X", "Y", "A"],
-    &["X", "Y", "Z", "A"],
-];
+const AXES: [&[&str]; 8] =
+    [&[], &[], &["X", "Y", "Z"], &["X"], &["X", "Y"], &["X", "Z"], &["X", "Y", "A"], &["X", "Y", "Z", "A"]];
 
 const SAMPLES: [&str; 2] =
     [include_str!("../../../jobs/mill3.toml"), include_str!("../../../jobs/router4.toml")];

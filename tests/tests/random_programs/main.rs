@@ -11,7 +11,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use machines::{Frame, frame};
 use planner::job::gcode::Options;
-use planner::pipeline::LimitSet;
+use planner::job::machine::LimitSet;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
@@ -47,9 +47,24 @@ impl Case {
         let planned = chain::plan(text.as_bytes(), &machine, &Options::default(), limits);
         let chain = planned.map_err(|e| {
             let debug = format!("{e:?}");
-            let kind = ["NotCertified", "TooManySpans", "TooFar", "Gap", "NotFinite", "Resolution", "Uneven", "Slow",
-                "TooShort", "NothingMoves", "Solver", "Travel", "Radi"]
-                .into_iter().find(|k| debug.contains(k)).unwrap_or("refused");
+            let kind = [
+                "NotCertified",
+                "TooManySpans",
+                "TooFar",
+                "Gap",
+                "NotFinite",
+                "Resolution",
+                "Uneven",
+                "Slow",
+                "TooShort",
+                "NothingMoves",
+                "Solver",
+                "Travel",
+                "Radi",
+            ]
+            .into_iter()
+            .find(|k| debug.contains(k))
+            .unwrap_or("refused");
             Finding { kind, text: e.to_string() }
         })?;
         judge(&chain, &machine, 20).map(|_| ())
@@ -80,7 +95,9 @@ fn random_programs_hold() {
     let mut findings: BTreeMap<&str, u32> = BTreeMap::new();
     for number in 0..cases {
         let mut tree = strategy.new_tree(&mut runner).unwrap();
-        if number < setting("FEEDSPLINE_FROM", 0) || setting("FEEDSPLINE_SAMPLES", 0) == 1 && tree.current().frame.axes > 1 {
+        if number < setting("FEEDSPLINE_FROM", 0)
+            || setting("FEEDSPLINE_SAMPLES", 0) == 1 && tree.current().frame.axes > 1
+        {
             continue;
         }
         let begin = std::time::Instant::now();
@@ -92,7 +109,9 @@ fn random_programs_hold() {
         let count = findings.entry(finding.kind).or_default();
         *count += 1;
         println!("== case {number}: {finding}");
-        if std::env::var("FEEDSPLINE_ONLY").is_ok_and(|k| k != finding.kind) || *count > setting("FEEDSPLINE_SHRUNK", 1) as u32 {
+        if std::env::var("FEEDSPLINE_ONLY").is_ok_and(|k| k != finding.kind)
+            || *count > setting("FEEDSPLINE_SHRUNK", 1) as u32
+        {
             continue;
         }
         let mut best = tree.current();
@@ -108,7 +127,11 @@ fn random_programs_hold() {
                 _ => simpler = tree.complicate(),
             }
         }
-        println!("== {finding}\n{best:?}\n{}\n{}", best.frame.toml().lines().next().unwrap_or_default(), best.text());
+        println!(
+            "== {finding}\n{best:?}\n{}\n{}",
+            best.frame.toml().lines().next().unwrap_or_default(),
+            best.text()
+        );
     }
     assert!(findings.is_empty(), "{findings:?} of {cases}");
 }

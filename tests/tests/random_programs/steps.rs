@@ -174,7 +174,8 @@ impl<'m> Writer<'m> {
 
     /// A number from -1 to 1.
     fn random(&mut self) -> f64 {
-        self.noise = self.noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.noise =
+            self.noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.noise >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
@@ -190,7 +191,9 @@ impl<'m> Writer<'m> {
                 for k in 0..=corners {
                     let angle = sweep * f64::from(k) / f64::from(corners);
                     let mut p = centre.clone();
-                    for (axis, value) in [radius * (angle.cos() - 1.0), radius * angle.sin()].iter().enumerate() {
+                    for (axis, value) in
+                        [radius * (angle.cos() - 1.0), radius * angle.sin()].iter().enumerate()
+                    {
                         let noise = noise * self.random();
                         if let Some(p) = p.get_mut(axis) {
                             *p += value + noise;
@@ -238,9 +241,11 @@ impl<'m> Writer<'m> {
     }
 
     fn arc(&mut self, plane: usize, radius: f64, from: f64, sweep: f64, rise: f64, turns: u8) {
-        let (word, names, offsets) =
-            [("G17", ["X", "Y", "Z"], ["I", "J"]), ("G18", ["Z", "X", "Y"], ["K", "I"]), ("G19", ["Y", "Z", "X"], ["J", "K"])]
-                [plane];
+        let (word, names, offsets) = [
+            ("G17", ["X", "Y", "Z"], ["I", "J"]),
+            ("G18", ["Z", "X", "Y"], ["K", "I"]),
+            ("G19", ["Y", "Z", "X"], ["J", "K"]),
+        ][plane];
         let index = |name: &str| self.machine.axes.iter().position(|a| a.name == name);
         let (Some(a), Some(b)) = (index(names[0]), index(names[1])) else { return };
         let i = self.rounded(radius * (from + PI).cos());

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::geometry::grid_path::GridPath;
 use crate::geometry::section::SpeedCap;
-use crate::job::machine::{AxisKind, CornerMode, Plant, Servo, Unit};
+use crate::job::machine::{Axis, AxisKind, CornerMode, Plant, Servo, Unit};
 use crate::job::program::{Arc, Corner, Feed, Move, Shape, ToleranceSource};
 
 fn axis(name: &str, kind: AxisKind, counts_per_unit: f64) -> Axis {
