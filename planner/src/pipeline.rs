@@ -12,8 +12,7 @@ use crate::certificate::{Certificate, certify};
 use crate::feed::job::{JobItem, PlannedSection};
 use crate::geometry::section::Section;
 use crate::geometry::sections::SectionItem;
-use crate::job::machine::{Axis, AxisLimits, Machine};
-use crate::job::program::MoveKind;
+use crate::job::machine::{AxisLimits, LimitSet, Machine};
 use crate::topp::problem::{Binding, Problem, Settings};
 use crate::topp::{self, PlanError};
 
@@ -22,30 +21,6 @@ const WAITING: usize = 256;
 
 /// A batch is planned when its geometry spans reach this many, or nothing more is waiting.
 const BATCH_SPANS: usize = 4096;
-
-/// Which limits of the axes a plan keeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum LimitSet {
-    /// Velocity and acceleration.
-    VelocityAcceleration,
-    /// Velocity, acceleration and jerk.
-    #[default]
-    VelocityAccelerationJerk,
-}
-
-impl LimitSet {
-    /// The limits of `axis` that count for moves of `kind`.
-    pub fn of(self, axis: &Axis, kind: MoveKind) -> AxisLimits {
-        let limits = match kind {
-            MoveKind::Rapid => axis.rapid,
-            MoveKind::Feed => axis.limits,
-        };
-        match self {
-            LimitSet::VelocityAcceleration => AxisLimits { jerk: f64::INFINITY, ..limits },
-            LimitSet::VelocityAccelerationJerk => limits,
-        }
-    }
-}
 
 /// A planned job.
 #[derive(Clone, Debug, Default)]

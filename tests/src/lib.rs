@@ -1,4 +1,6 @@
 //! Oracles, generators and shared pieces of the whole-product suites.
 
+pub mod chain;
+pub mod judge;
 pub mod oracle;
 pub mod tables;

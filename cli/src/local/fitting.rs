@@ -9,9 +9,9 @@ use std::time::Instant;
 use planner::analysis::comparison::Comparison;
 use planner::geometry::sections::{PathSettings, SectionError, sections};
 use planner::job::gcode::{self, Counters, Options, ProgramError};
-use planner::job::machine::Machine;
+use planner::job::machine::{LimitSet, Machine};
 use planner::job::program::{Corner, Item, MoveKind, StopCause, ToleranceSource};
-use planner::pipeline::{self, JobError, JobPlan, LimitSet};
+use planner::pipeline::{self, JobError, JobPlan};
 use planner::topp::problem::{Settings, Solver};
 
 use crate::args::{self, PlanArgs};
@@ -76,7 +76,7 @@ pub(super) fn plan(args: &PlanArgs, progress: &mut Progress) -> Result<Fitted, F
         Ok(Item::Dwell { seconds, .. }) => comparison.add_dwell(*seconds),
         Ok(Item::Stop { .. } | Item::Note { .. }) | Err(_) => {}
     });
-    let mut sections = sections(items, &machine, &PathSettings::of(&machine));
+    let mut sections = sections(items, &machine, &PathSettings::of(&machine, limits(args)));
     let planned = pipeline::plan(&mut sections, &machine, limits(args), &settings(args), &mut |line| {
         progress.share(f64::from(line) / lines.max(1) as f64);
     });

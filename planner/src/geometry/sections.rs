@@ -11,8 +11,8 @@ use super::gather::Gather;
 use super::marks::marks;
 use super::round::{LARGEST_CONTROL, round};
 use super::section::{Marks, Section};
-use crate::job::machine::{Axis, AxisLimits, MAX_AXES, Machine, Point};
-use crate::job::program::{Item, MoveKind, StopCause};
+use crate::job::machine::{AxisLimits, LimitSet, MAX_AXES, Machine, Point};
+use crate::job::program::{Feed, Item, MoveKind, StopCause};
 
 /// Most drive counts that an axis moves in one geometry span, with room for rounding.
 const SPAN_COUNTS: f64 = rules::MAX_CONTROL_STEP as f64 * 0.98;
@@ -37,29 +37,44 @@ pub struct PathSettings {
     pub feed_rest_span: f64,
     /// Shortest rest span of rapids.
     pub rapid_rest_span: f64,
+    /// Lowest jerk limit of feed moves; infinite without one.
+    pub feed_jerk: f64,
 }
 
 impl PathSettings {
-    /// The usual settings on a machine.
-    pub fn of(machine: &Machine) -> Self {
-        let span = |limits: fn(&Axis) -> AxisLimits| shortest_rest_span(machine.axes.iter().map(limits));
+    /// The usual settings on a machine that is to keep these limits.
+    pub fn of(machine: &Machine, limits: LimitSet) -> Self {
+        let span = |kind| {
+            shortest_rest_span(machine.axes.iter().map(|a| limits.of(a, kind)), machine.control_tick_s)
+        };
         Self {
             exact_tolerance_mm: machine.exact_path_mm,
             rapid_tolerance_mm: machine.tolerance_mm,
             longest_span_mm: 4.0,
-            feed_rest_span: span(|a| a.limits),
-            rapid_rest_span: span(|a| a.rapid),
+            feed_rest_span: span(MoveKind::Feed),
+            rapid_rest_span: span(MoveKind::Rapid),
+            feed_jerk: machine
+                .axes
+                .iter()
+                .map(|a| limits.of(a, MoveKind::Feed).jerk)
+                .fold(f64::INFINITY, f64::min),
         }
     }
 }
 
-/// The shortest rest span, min A^3 / (6 J^2) over the axes: there acceleration saturates as the rest span ends.
-/// Infinite if no axis' jerk is limited.
-pub fn shortest_rest_span(limits: impl Iterator<Item = AxisLimits>) -> f64 {
-    limits
-        .filter(|l| l.jerk.is_finite())
-        .map(|l| l.acceleration.powi(3) / (6.0 * l.jerk * l.jerk))
-        .fold(f64::INFINITY, f64::min)
+/// The shortest rest span, min A t^2 / 6 over the axes: there acceleration saturates as the rest span ends. It takes
+/// t = A/J, but no less than two control ticks.
+fn shortest_rest_span(limits: impl Iterator<Item = AxisLimits>, tick_s: f64) -> f64 {
+    let span = |l: AxisLimits| {
+        let t = (l.acceleration / l.jerk).max(2.0 * tick_s);
+        l.acceleration * t * t / 6.0
+    };
+    limits.map(span).fold(f64::INFINITY, f64::min)
+}
+
+/// Half of a speed gained at full jerk, v/6 sqrt(v/J): where a slow feed ends the rest span.
+fn half_ramp(speed: f64, jerk: f64) -> f64 {
+    speed * (speed / jerk).sqrt() / 6.0
 }
 
 /// What the geometry hands on, in program order. A note inside a section comes before it.
@@ -270,7 +285,7 @@ impl<I> Sections<I> {
         }
         let tolerance = contour.primitives.iter().fold(f64::INFINITY, |m, p| m.min(p.tolerance));
         let rest = match kind {
-            MoveKind::Feed => self.settings.feed_rest_span,
+            MoveKind::Feed => self.settings.feed_rest_span.min(self.slow_rest(contour)),
             MoveKind::Rapid => self.settings.rapid_rest_span,
         };
         let [from, to] = [(&start, &first), (&stop, &last)].map(|(counts, p)| self.offset(counts, p));
@@ -315,6 +330,18 @@ impl<I> Sections<I> {
         let (caps, blocks) = marks(contour, &path, &self.metric);
         self.at = Some(stop);
         Ok(Made::Section(Section { kind, path, marks: Marks { caps, blocks, deviation, end } }))
+    }
+
+    /// Four times the rest span that the feeds at both ends ask for; infinite if they ask for none.
+    fn slow_rest(&self, contour: &Contour) -> f64 {
+        let ends = [contour.primitives.first(), contour.primitives.last()];
+        let rest = ends.into_iter().flatten().map(|p| match p.feed {
+            Some(Feed::Speed(speed)) if self.settings.feed_jerk.is_finite() => {
+                4.0 * half_ramp(speed, self.settings.feed_jerk)
+            }
+            Some(Feed::Speed(_) | Feed::Duration(_)) | None => f64::INFINITY,
+        });
+        rest.fold(f64::INFINITY, f64::min)
     }
 
     /// The nearest drive counts.

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::program::MoveKind;
+
 /// Most axes one job can move.
 pub const MAX_AXES: usize = 9;
 
@@ -107,6 +109,30 @@ pub struct AxisLimits {
     pub acceleration: f64,
     /// Largest |jerk|; infinite when jerk is not limited.
     pub jerk: f64,
+}
+
+/// Which limits of the axes a plan keeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LimitSet {
+    /// Velocity and acceleration.
+    VelocityAcceleration,
+    /// Velocity, acceleration and jerk.
+    #[default]
+    VelocityAccelerationJerk,
+}
+
+impl LimitSet {
+    /// The limits of `axis` that count for moves of `kind`.
+    pub fn of(self, axis: &Axis, kind: MoveKind) -> AxisLimits {
+        let limits = match kind {
+            MoveKind::Rapid => axis.rapid,
+            MoveKind::Feed => axis.limits,
+        };
+        match self {
+            LimitSet::VelocityAcceleration => AxisLimits { jerk: f64::INFINITY, ..limits },
+            LimitSet::VelocityAccelerationJerk => limits,
+        }
+    }
 }
 
 /// The mechanics of one axis, in generalised SI units: kg, N, m on slides; kg m^2, N m, rad on rotary axes.

@@ -16,6 +16,21 @@ const MOST_STEPS: usize = 8;
 #[derive(Default)]
 struct Programme {
     rows: Vec<(usize, [f64; 3], f64)>,
+    cells: Vec<Cell>,
+}
+
+/// The jerk rows of one cell: both signs of Bernstein coefficients 0, 1, 2, 0, ...
+struct Cell {
+    span: usize,
+    rows: std::ops::Range<usize>,
+    x: [[f64; 3]; 3],
+}
+
+/// An answer: control values, one multiplier per row, iterations.
+struct Answer {
+    x: Vec<f64>,
+    multipliers: Vec<f64>,
+    iterations: u64,
 }
 
 /// How jerk rows are linearised.
@@ -23,7 +38,7 @@ struct Programme {
 enum Jerk<'a> {
     /// |F| <= 1/sqrt(x*), x* per inner span.
     Pseudo(&'a [f64]),
-    /// Tangent of 1/sqrt(x) at the mean of these control values over each cell.
+    /// Tangent of 1/sqrt(x) at 1/s^2, s per cell.
     Tangent(&'a [f64]),
 }
 
@@ -38,13 +53,15 @@ pub(super) fn solve(
     let (mut best, mut best_time): (Option<Vec<f64>>, f64) = (None, f64::INFINITY);
     let mut iterations = 0;
     let mut at = start.to_vec();
+    let mut tangents = Vec::new();
     for step in 0..=MOST_STEPS {
-        let jerk = if step == 0 { Jerk::Pseudo(swept) } else { Jerk::Tangent(&at) };
+        let jerk = if step == 0 { Jerk::Pseudo(swept) } else { Jerk::Tangent(&tangents) };
         let programme = Programme::new(source, half, jerk);
         let (_, gradient) = time(source, &at);
-        let Some((x, count)) = programme.solve(&gradient) else { break };
-        iterations += count;
-        let x = programme.shrink(x);
+        let Some(answer) = programme.solve(&gradient) else { break };
+        iterations += answer.iterations;
+        let x = programme.shrink(answer.x);
+        tangents = programme.tangents(&x, &answer.multipliers);
         let (seconds, _) = time(source, &x);
         if !seconds.is_finite() {
             break;
@@ -115,8 +132,16 @@ impl Programme {
     }
 
     fn cell(&mut self, s: usize, cell: &CellRows, half: &[f64; 3], jerk: Jerk) {
-        let mut add = |a: [f64; 3], bound: f64, robust: f64| self.rows.push((s, a, bound - robust));
+        let rows = &mut self.rows;
+        let mut add = |a: [f64; 3], bound: f64, robust: f64| rows.push((s, a, bound - robust));
         let loss = |a: &[f64; 3]| a[0].abs() * half[0] + a[1].abs() * half[1] + a[2].abs() * half[2];
+        let (alpha, beta) = match jerk {
+            Jerk::Pseudo(swept) => (swept[s].sqrt(), 0.0),
+            Jerk::Tangent(tangents) => {
+                let tangent = tangents[self.cells.len()];
+                (1.0 / (1.5 * tangent), tangent * tangent / 3.0)
+            }
+        };
         for (a, _) in &cell.upper {
             add(*a, 1.0, loss(a));
         }
@@ -126,24 +151,35 @@ impl Programme {
         }
         for (i, (f, _)) in cell.jerk.iter().enumerate() {
             let x = &cell.x[i % 3];
-            let (alpha, beta) = match jerk {
-                Jerk::Pseudo(swept) => (swept[s].sqrt(), 0.0),
-                Jerk::Tangent(at) => {
-                    let c = controls(at, s);
-                    let mean = cell.x.iter().map(|x| dot(x, &c).ln()).sum::<f64>() / 3.0;
-                    let tangent = (-0.5 * mean).exp();
-                    (1.0 / (1.5 * tangent), tangent * tangent / 3.0)
-                }
-            };
             for sign in [alpha, -alpha] {
                 let a = [0, 1, 2].map(|j| sign * f[j] + beta * x[j]);
                 add(a, 1.0, alpha * loss(f) + beta * loss(x));
             }
         }
+        let end = self.rows.len();
+        self.cells.push(Cell { span: s, rows: end - 2 * cell.jerk.len()..end, x: cell.x });
+    }
+
+    /// The next tangents: at the mean of x weighted by the multipliers, which is where the optimum has them; at the
+    /// plain mean where no jerk row is active.
+    fn tangents(&self, x: &[f64], multipliers: &[f64]) -> Vec<f64> {
+        const INACTIVE: f64 = 1e-6;
+        let floor = INACTIVE * multipliers.iter().copied().fold(0.0, f64::max);
+        let tangent = |cell: &Cell| {
+            let c = controls(x, cell.span);
+            let b = cell.x.map(|x| dot(&x, &c));
+            let (mut weight, mut moment) = (3.0 * floor, floor * b.iter().sum::<f64>());
+            for (i, z) in multipliers[cell.rows.clone()].iter().enumerate() {
+                weight += z.max(0.0);
+                moment += z.max(0.0) * b[i / 2 % 3];
+            }
+            (weight / moment).sqrt()
+        };
+        self.cells.iter().map(tangent).collect()
     }
 
     /// Minimises gradient . x.
-    fn solve(&self, gradient: &[f64]) -> Option<(Vec<f64>, u64)> {
+    fn solve(&self, gradient: &[f64]) -> Option<Answer> {
         let n = gradient.len();
         let mut columns: Vec<(Vec<usize>, Vec<f64>)> = vec![Default::default(); n];
         for (row, (s, a, _)) in self.rows.iter().enumerate() {
@@ -179,7 +215,11 @@ impl Programme {
         let solution = &solver.solution;
         let usable = matches!(solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved);
         let sound = solution.x.iter().all(|x| x.is_finite());
-        (usable && sound).then(|| (solution.x.clone(), u64::from(solution.iterations)))
+        (usable && sound).then(|| Answer {
+            x: solution.x.clone(),
+            multipliers: solution.z.clone(),
+            iterations: u64::from(solution.iterations),
+        })
     }
 
     /// Scales an answer that violates rows by the solver's tolerance back inside.

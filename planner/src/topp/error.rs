@@ -138,9 +138,6 @@ pub enum PlanError {
         /// Its start.
         u: f64,
     },
-    /// The reference solver gave up.
-    #[error("the reference solver ended without a usable answer; use the interior-point solver")]
-    Solver,
 }
 
 /// What is wrong with a path.
@@ -179,8 +176,7 @@ impl PlanError {
             | PlanError::TooShort { .. }
             | PlanError::TooLong { .. }
             | PlanError::NothingMoves
-            | PlanError::Setting { .. }
-            | PlanError::Solver => None,
+            | PlanError::Setting { .. } => None,
         }
     }
 }

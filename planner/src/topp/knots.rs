@@ -16,7 +16,7 @@ const LONGEST_S: f64 = 0.4;
 /// Fewest spans of a short move, and of one too short to build up full acceleration: only with so many is its loss
 /// below one per cent.
 const FEWEST_SPANS: f64 = 32.0;
-const FEWEST_ALL_JERK: f64 = 64.0;
+const FEWEST_ALL_JERK: f64 = 48.0;
 /// Longest step of a table [grid steps].
 const LONGEST_STEP: f64 = (1u64 << 31) as f64;
 /// Most spans of one table: beyond, memory would not do.
@@ -59,13 +59,13 @@ pub(super) fn place(problem: &Problem, settings: &Settings, sweep: &Sweep) -> Re
     Ok(layout)
 }
 
-/// Divides each span `i` into `parts[i]` parts of about equal length; false where the grid is too coarse for that.
+/// Divides each span `i` into `parts[i]` parts of about equal length; the error is a span too short for that.
 pub(super) fn refine(path: &GridPath, layout: &Layout, parts: &[u32]) -> Result<Layout, usize> {
     let mut knots = vec![0];
     let mut cells = Vec::with_capacity(layout.spans());
-    for i in 0..layout.spans() {
+    for (i, &parts) in parts.iter().enumerate() {
         let (a, b) = (layout.knots[i], layout.knots[i + 1]);
-        let k = u64::from(parts[i].max(1));
+        let k = u64::from(parts.max(1));
         if b - a < k {
             return Err(i);
         }
@@ -211,7 +211,7 @@ impl<'a> Estimate<'a> {
     /// enough for the rounding of q to stay a small share of the limits.
     fn shortest_s(&self, a: u64) -> f64 {
         const CLEAR: f64 = 1.3;
-        const ROUNDING_SHARE: f64 = 0.04;
+        const ROUNDING_SHARE: f64 = 0.006;
         let path = self.path;
         let g = path.breaks.partition_point(|&b| b <= a).clamp(1, path.spans()) - 1;
         let mut noise: f64 = 0.0;

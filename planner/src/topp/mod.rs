@@ -35,6 +35,9 @@ const MOST_RESCALES: usize = 6;
 /// Headroom of the codes above the swept q.
 const CEILING: f64 = 1.1;
 
+/// What finer codes make of the ceiling: half the top speed makes them twice as fine.
+const FINER: f64 = 0.25;
+
 /// Finds the fastest motion from rest to rest along a path, rounded.
 ///
 /// The rounded table keeps every limit everywhere, by Bernstein bounds. Time and memory grow linearly with the path.
@@ -43,22 +46,28 @@ const CEILING: f64 = 1.1;
 ///
 /// [`PlanError`] names what makes the problem one without an answer, and where.
 pub fn plan(problem: &Problem, settings: &Settings) -> Result<Plan, PlanError> {
+    plan_whole_up_to(window::WHOLE, problem, settings)
+}
+
+/// [`plan`], in windows when there are more than `whole` spans.
+fn plan_whole_up_to(whole: usize, problem: &Problem, settings: &Settings) -> Result<Plan, PlanError> {
     error::validate(problem)?;
     validate_settings(settings)?;
     let limits = slowed(problem);
     let problem = &Problem { limits: &limits, ..*problem };
     let sweep = Sweep::new(problem);
     let mut layout = knots::place(problem, settings, &sweep)?;
+    let attempt = Attempt { whole, problem, settings, sweep: &sweep };
     let mut iterations = 0;
     for _ in 0..MOST_REFINEMENTS {
-        let plan = solve(problem, settings, &sweep, &layout, &mut iterations)?;
+        let plan = attempt.solve(&layout, &mut iterations)?;
         let Some(parts) = check::format(&layout, &plan.table) else {
             return Ok(Plan { iterations, ..plan });
         };
         layout = knots::refine(problem.path, &layout, &parts)
             .map_err(|span| format_error(problem, &layout, &plan, span))?;
     }
-    let plan = solve(problem, settings, &sweep, &layout, &mut iterations)?;
+    let plan = attempt.solve(&layout, &mut iterations)?;
     match check::format(&layout, &plan.table) {
         None => Ok(Plan { iterations, ..plan }),
         Some(parts) => {
@@ -68,21 +77,34 @@ pub fn plan(problem: &Problem, settings: &Settings) -> Result<Plan, PlanError> {
     }
 }
 
-/// The limits, jerk lowered where a move would else be over in so few ticks that its spans could not last one each:
-/// rest to rest under jerk alone takes T with L = J T^3/32.
+/// The limits, lowered where they would let speed or acceleration change within so few ticks that no span could
+/// follow.
+///
+/// A move that is over in 8 ticks has its jerk lowered: rest to rest under jerk alone takes T with L = J T^3/32. Full
+/// speed takes at least 6 ticks to reach, full acceleration 2. What this costs is a few ticks per move.
 fn slowed(problem: &Problem) -> Vec<AxisLimits> {
-    const FEWEST_TICKS: f64 = 8.0;
-    let shortest = FEWEST_TICKS * problem.shortest_span_s;
+    const MOVE_TICKS: f64 = 8.0;
+    const SPEED_TICKS: f64 = 6.0;
+    const ACCELERATION_TICKS: f64 = 2.0;
+    let tick = problem.shortest_span_s;
+    if tick == 0.0 {
+        return problem.limits.to_vec();
+    }
+    let shortest = MOVE_TICKS * tick;
     problem
         .limits
         .iter()
         .zip(&problem.path.axes)
         .map(|(l, axis)| {
+            let acceleration = l.acceleration.min(l.velocity / (SPEED_TICKS * tick));
+            let mut jerk = l.jerk.min(acceleration / (ACCELERATION_TICKS * tick));
             let travel = axis.controls.windows(2).map(|c| c[1].abs_diff(c[0]) as f64).sum::<f64>() * axis.lsb;
             let ruled = 32.0 * travel / shortest.powi(3);
             // Where acceleration saturates under that jerk, the move takes longer anyway.
-            let rules = travel > 0.0 && ruled < l.jerk && 0.25 * shortest * ruled < l.acceleration;
-            AxisLimits { jerk: if rules { ruled } else { l.jerk }, ..*l }
+            if travel > 0.0 && ruled < jerk && 0.25 * shortest * ruled < acceleration {
+                jerk = ruled;
+            }
+            AxisLimits { velocity: l.velocity, acceleration, jerk }
         })
         .collect()
 }
@@ -104,71 +126,62 @@ fn validate_settings(settings: &Settings) -> Result<(), PlanError> {
     Ok(())
 }
 
-/// Solves on given knots, rounds and checks.
-fn solve(
-    problem: &Problem,
-    settings: &Settings,
-    sweep: &Sweep,
-    layout: &Layout,
-    iterations: &mut u64,
-) -> Result<Plan, PlanError> {
-    let unit = sweep.top();
-    let mut source = RowSource {
-        problem: *problem,
-        layout,
-        unit,
-        ceiling: CEILING,
-        joint: joints(problem, layout).map(|q| q / unit),
-    };
-    let mut worst = 1;
-    for _ in 0..MOST_RESCALES {
-        source.joint = joints(problem, layout).map(|q| (q / unit).min(source.ceiling));
-        let scale = rounding::scale(unit, source.ceiling);
-        let half = rounding::halves(&source, scale, sweep);
-        let x = optimise(&source, settings, sweep, &half, iterations)?;
-        let table = rounding::table(&source, scale, &x);
-        let rounded = rounding::values(&source, &table);
-        let findings = check::rows(&source, &rounded, &half);
-        if findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC {
-            return Ok(Plan { table, binding: findings.binding, iterations: 0 });
-        }
-        worst = findings.span;
-        // Rounding alone breaks a limit: the codes are too coarse for the slowest places. Half the top speed makes
-        // them twice as fine.
-        source.ceiling *= 0.25;
-    }
-    Err(PlanError::Resolution { span: worst, u: layout.start(problem.path, worst) })
+/// What one solution after another is found from.
+struct Attempt<'a> {
+    whole: usize,
+    problem: &'a Problem<'a>,
+    settings: &'a Settings,
+    sweep: &'a Sweep,
 }
 
-/// Control values of minimum time.
-fn optimise(
-    source: &RowSource,
-    settings: &Settings,
-    sweep: &Sweep,
-    half: &[f64],
-    iterations: &mut u64,
-) -> Result<Vec<f64>, PlanError> {
-    let mut x = start::profile(source);
-    match settings.solver {
-        Solver::InteriorPoint => {
-            *iterations +=
-                window::solve(source, &mut x, half, settings.relative_gap).ok_or(PlanError::Solver)?;
-            Ok(x)
+impl Attempt<'_> {
+    /// Solves on given knots, rounds and checks.
+    fn solve(&self, layout: &Layout, iterations: &mut u64) -> Result<Plan, PlanError> {
+        let problem = self.problem;
+        let unit = self.sweep.top();
+        let joints = joints(problem, layout);
+        let mut source = RowSource { problem: *problem, layout, unit, ceiling: CEILING, joint: joints };
+        let mut worst = 1;
+        for _ in 0..MOST_RESCALES {
+            source.joint = joints.map(|q| (q / unit).min(source.ceiling));
+            let scale = rounding::scale(unit, source.ceiling);
+            let half = rounding::halves(&source, scale, self.sweep);
+            if let Some(x) = self.optimise(&source, &half, iterations) {
+                let table = rounding::table(&source, scale, &x);
+                let rounded = rounding::values(&source, &table);
+                let findings = check::rows(&source, &rounded, &half);
+                if findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC {
+                    return Ok(Plan { table, binding: findings.binding, iterations: 0 });
+                }
+                worst = findings.span;
+            }
+            // Rounding alone breaks a limit: the codes are too coarse for the slowest places.
+            source.ceiling *= FINER;
         }
-        Solver::Clarabel => {
-            let (layout, path) = (source.layout, source.problem.path);
-            let mut hint = 0;
-            let swept: Vec<f64> = (1..layout.spans() - 1)
-                .map(|i| {
-                    let (from, to) = (layout.start(path, i), layout.start(path, i + 1));
-                    sweep.largest(from, to, &mut hint) / source.unit
-                })
-                .collect();
-            let (x, count) =
-                clarabel::solve(source, &swept, &x, half, settings.relative_gap).ok_or(PlanError::Solver)?;
-            *iterations += count;
-            Ok(x)
+        Err(PlanError::Resolution { span: worst, u: layout.start(problem.path, worst) })
+    }
+
+    /// Control values of minimum time; `None` where rounding alone would break a limit at any speed.
+    fn optimise(&self, source: &RowSource, half: &[f64], iterations: &mut u64) -> Option<Vec<f64>> {
+        let mut x = start::profile(source);
+        let gap = self.settings.relative_gap;
+        match self.settings.solver {
+            Solver::InteriorPoint => *iterations += window::solve(source, &mut x, half, gap, self.whole)?,
+            Solver::Clarabel => {
+                let (layout, path) = (source.layout, source.problem.path);
+                let mut hint = 0;
+                let swept: Vec<f64> = (1..layout.spans() - 1)
+                    .map(|i| {
+                        let (from, to) = (layout.start(path, i), layout.start(path, i + 1));
+                        self.sweep.largest(from, to, &mut hint) / source.unit
+                    })
+                    .collect();
+                let (answer, count) = clarabel::solve(source, &swept, &x, half, gap)?;
+                *iterations += count;
+                x = answer;
+            }
         }
+        Some(x)
     }
 }
 

@@ -30,7 +30,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// The interior-point method, within a hundredth of a permille of the optimum, at a tenth of a percent lost to knots.
+    /// Interior point, a gap of 1e-5 of the time, four spans per ramp: about 0.1 % above a very fine plan.
     fn default() -> Self {
         Settings { solver: Solver::InteriorPoint, relative_gap: 1e-5, spans_per_ramp: 4.0 }
     }

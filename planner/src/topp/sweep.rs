@@ -15,7 +15,7 @@ pub struct Sweep {
     pub stations: Vec<f64>,
     /// q there; zero at both ends.
     pub q: Vec<f64>,
-    /// Largest q at standstill of jerk and path acceleration, jerk included.
+    /// Largest q, jerk of a steady speed included, at which the path can be travelled there.
     pub constant: Vec<f64>,
 }
 

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::geometry::grid_path::GridPath;
 use crate::geometry::section::SpeedCap;
-use crate::job::machine::{AxisKind, CornerMode, Plant, Servo, Unit};
+use crate::job::machine::{Axis, AxisKind, CornerMode, Plant, Servo, Unit};
 use crate::job::program::{Arc, Corner, Feed, Move, Shape, ToleranceSource};
 
 fn axis(name: &str, kind: AxisKind, counts_per_unit: f64) -> Axis {
@@ -116,7 +116,7 @@ impl Program {
 
     fn run(&self, machine: &Machine) -> Vec<Section> {
         let mut found = Vec::new();
-        for item in sections(self.stream(), machine, &PathSettings::of(machine)) {
+        for item in sections(self.stream(), machine, &PathSettings::of(machine, LimitSet::default())) {
             if let SectionItem::Section(s) = item.expect("the program is sound") {
                 found.push(s);
             }
@@ -383,7 +383,7 @@ fn exact_corners_reversals_stops_and_rapids_end_sections() {
     let expected =
         [ExactPathCorner, Reversal, ExactStop, Rapid, Rapid, Rapid, Dwell, ExactPathCorner, ToolChange];
     assert_eq!(ends, expected);
-    let mut all = sections(p.stream(), &machine, &PathSettings::of(&machine));
+    let mut all = sections(p.stream(), &machine, &PathSettings::of(&machine, LimitSet::default()));
     let items: Vec<_> = all.by_ref().map(Result::unwrap).collect();
     assert!(items.contains(&SectionItem::Dwell { seconds: 0.5, line: 90 }));
     assert_eq!(items.last(), Some(&SectionItem::Stop { cause: ToolChange, line: 91 }));
@@ -521,7 +521,9 @@ fn coarse_counts_widen_the_tolerance_to_what_they_allow() {
 fn bad_numbers_and_gaps_are_refused() {
     let machine = mill();
     let first_error = |p: &Program| {
-        sections(p.stream(), &machine, &PathSettings::of(&machine)).find_map(|r| r.err()).expect("refused")
+        sections(p.stream(), &machine, &PathSettings::of(&machine, LimitSet::default()))
+            .find_map(|r| r.err())
+            .expect("refused")
     };
     let mut p = Program::new(&[0.0], FINE);
     p.line(&[f64::NAN]);
@@ -552,7 +554,7 @@ fn hostile_numbers_end_in_bounded_time() {
             for sweep in [1e-12, 3.0, -1e4, 1e12] {
                 let mut p = Program::new(&[0.0], within(tolerance));
                 p.line(&[size, 0.0, 0.0]).arc([0, 1], size, 0.0, sweep, size).line(&[0.0, -size, size]);
-                for item in sections(p.stream(), &machine, &PathSettings::of(&machine)) {
+                for item in sections(p.stream(), &machine, &PathSettings::of(&machine, LimitSet::default())) {
                     let Ok(SectionItem::Section(s)) = item else { continue };
                     assert!(s.marks.deviation.bound_mm <= s.marks.deviation.tolerance_mm);
                 }

@@ -101,9 +101,7 @@ mod tests {
             let x: Vec<f64> = (0..n).map(|i| (i as f64 * 1.7).sin()).collect();
             let at = |i: usize, j: usize| b.band[i.min(j)].get(i.abs_diff(j)).copied().unwrap_or(0.0);
             let mut y = vec![0.0; n];
-            for i in lo..hi {
-                y[i] = (lo..hi).map(|j| at(i, j) * x[j]).sum();
-            }
+            (lo..hi).for_each(|i| y[i] = (lo..hi).map(|j| at(i, j) * x[j]).sum());
             b.factorise(lo, hi);
             b.solve(lo, hi, &mut y);
             for i in lo..hi {

@@ -330,14 +330,14 @@ impl Rows {
             let t = cell.tangent(cell.s, &c);
             for (p, b, jerk) in numbered(&mut self.pairs, cell) {
                 let v = product(&p.f, &c);
-                for l in 0..LANES {
+                for (l, v) in v.into_iter().enumerate() {
                     let (base, alpha) = if jerk {
                         (t.base[(LANES * b + l) % 3] - t.alpha * p.phi[l], t.alpha)
                     } else {
                         (cell.rhs, 1.0)
                     };
-                    f(base - alpha * v[l], &mut p.z[0][l]);
-                    f(base + alpha * v[l], &mut p.z[1][l]);
+                    f(base - alpha * v, &mut p.z[0][l]);
+                    f(base + alpha * v, &mut p.z[1][l]);
                 }
             }
         }
@@ -486,8 +486,8 @@ impl Sums {
         grow(&mut self.m[3], |l| b[1][l] * a[1][l]);
         grow(&mut self.m[4], |l| b[1][l] * a[2][l]);
         grow(&mut self.m[5], |l| b[2][l] * a[2][l]);
-        for j in 0..3 {
-            grow(&mut self.g[j], |l| inverse[l] * a[j][l]);
+        for (g, a) in self.g.iter_mut().zip(a) {
+            grow(g, |l| inverse[l] * a[l]);
         }
         grow(&mut self.gap, |l| z[l] * slack[l]);
     }
@@ -516,12 +516,10 @@ impl AffineSums {
         let correction = lanes(|l| t[l] * (1.0 - r[l]));
         grow(&mut self.s1, |l| t[l]);
         grow(&mut self.s2, |l| t[l] * r[l]);
-        for l in 0..LANES {
-            self.rise[l] = if r[l] > self.rise[l] { r[l] } else { self.rise[l] };
-            self.fall[l] = if r[l] < self.fall[l] { r[l] } else { self.fall[l] };
-        }
-        for j in 0..3 {
-            grow(&mut self.g[j], |l| correction[l] * inverse[l] * a[j][l]);
+        self.rise = lanes(|l| if r[l] > self.rise[l] { r[l] } else { self.rise[l] });
+        self.fall = lanes(|l| if r[l] < self.fall[l] { r[l] } else { self.fall[l] });
+        for (g, a) in self.g.iter_mut().zip(a) {
+            grow(g, |l| correction[l] * inverse[l] * a[l]);
         }
         correction
     }

@@ -20,7 +20,9 @@ const LEAST_CENTRING: f64 = 1e-5;
 /// Most iterations; runs end after 13 to 30.
 const MOST_ITERATIONS: u32 = 80;
 /// Least slack a start is scaled down to.
-const START_SLACK: f64 = 0.02;
+pub(super) const START_SLACK: f64 = 0.02;
+/// Most reductions of a start, by a fifth each.
+pub(super) const SCALINGS: u32 = 60;
 
 /// A stretch of control values to improve while its surroundings stand still.
 #[derive(Clone, Copy, Debug)]
@@ -29,15 +31,6 @@ pub(super) struct Stretch {
     pub(super) from: usize,
     /// One past the last.
     pub(super) to: usize,
-}
-
-/// How a stretch is solved.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Effort {
-    /// Stop when the gap is below this share of the time.
-    pub(super) relative_gap: f64,
-    /// First barrier parameter, as a share of the one that balances the start.
-    pub(super) warmth: f64,
 }
 
 /// Gauss points of one span, as rows of its three control values.
@@ -114,7 +107,7 @@ impl Workspace {
     /// Only for a stretch that is the whole problem: pinned neighbours are scaled too.
     pub(super) fn scale_into(&mut self) -> Option<f64> {
         let mut scale = 1.0;
-        for _ in 0..100 {
+        for _ in 0..SCALINGS {
             if self.rows.set_tangents(&self.c) > START_SLACK {
                 return Some(scale);
             }
@@ -124,7 +117,7 @@ impl Workspace {
         None
     }
 
-    /// Sets the tangents for the loaded profile and returns its least slack.
+    /// Sets the tangents for the loaded profile and returns their least slack.
     pub(super) fn settle(&mut self) -> f64 {
         self.rows.set_tangents(&self.c)
     }
@@ -164,8 +157,8 @@ impl Workspace {
         time
     }
 
-    /// Improves the loaded profile; returns the iterations it took.
-    pub(super) fn solve(&mut self, effort: Effort) -> u32 {
+    /// Improves the loaded profile until the gap is below a share of the time; returns the iterations it took.
+    pub(super) fn solve(&mut self, relative_gap: f64) -> u32 {
         let n = self.c.len();
         let [lo, hi] = self.free;
         self.best.clone_from(&self.c);
@@ -175,7 +168,7 @@ impl Workspace {
         self.band.reset(n);
         let _ = self.time();
         let balance = -(lo..hi).map(|j| self.gradient[j] * self.c[j]).sum::<f64>();
-        let mu = effort.warmth * balance / self.rows.push_back(&self.c).max(f64::MIN_POSITIVE);
+        let mu = balance / self.rows.push_back(&self.c).max(f64::MIN_POSITIVE);
         if !(mu.is_finite() && mu > 0.0) {
             return 0;
         }
@@ -191,7 +184,7 @@ impl Workspace {
                 self.best.clone_from(&self.c);
             }
             let gap = self.assemble(dual_step);
-            if gap < effort.relative_gap * time && (time - last_time).abs() < effort.relative_gap * time {
+            if gap < relative_gap * time && (time - last_time).abs() < relative_gap * time {
                 return iteration;
             }
             last_time = time;

@@ -3,7 +3,6 @@
 use crate::geometry::grid_path::{GridAxis, GridPath};
 use crate::geometry::section::{FeedCap, SpeedCap};
 use crate::job::machine::AxisLimits;
-use crate::topp::problem::{Settings, Solver};
 
 /// A small generator: xorshift64*.
 pub(super) struct Rng(u64);
@@ -25,10 +24,6 @@ impl Rng {
     pub(super) fn within(&mut self, a: f64, b: f64) -> f64 {
         a + (b - a) * self.unit()
     }
-}
-
-pub(super) fn settings() -> Settings {
-    Settings { solver: Solver::InteriorPoint, relative_gap: 1e-5, spans_per_ramp: 4.0 }
 }
 
 pub(super) fn limits(axes: usize, velocity: f64, acceleration: f64, jerk: f64) -> Vec<AxisLimits> {
@@ -122,4 +117,53 @@ pub(super) fn circle(radius: f64, turns: f64, per_turn: usize) -> GridPath {
         .map(|u| vec![radius * (u / radius).cos(), radius * (u / radius).sin()])
         .collect();
     polygon(&points, spacing, grid_step(spacing, 14))
+}
+
+/// A path on other `breaks`: the first and last spans are stretched along the end directions, the rest stays.
+pub(super) fn with_run_outs(path: &GridPath, breaks: Vec<u64>) -> GridPath {
+    let knot =
+        |breaks: &[u64], k: isize| breaks[k.clamp(0, breaks.len() as isize - 1) as usize] as f64 * path.step;
+    let nodes = |breaks: &[u64]| -> Vec<f64> {
+        (0..breaks.len() as isize + 2)
+            .map(|i| (knot(breaks, i - 2) + knot(breaks, i - 1) + knot(breaks, i)) / 3.0)
+            .collect()
+    };
+    let (old, new) = (nodes(&path.breaks), nodes(&breaks));
+    let shift = (breaks[1] - path.breaks[0]) as f64 * path.step;
+    let axes = path
+        .axes
+        .iter()
+        .map(|a| {
+            let c: Vec<f64> = a.controls.iter().map(|&c| c as f64).collect();
+            let n = old.len();
+            let slope =
+                [(c[1] - c[0]) / (old[1] - old[0]), (c[n - 1] - c[n - 2]) / (old[n - 1] - old[n - 2])];
+            let at = |u: f64| {
+                let u = u - shift;
+                if u <= 0.0 {
+                    return c[0] + slope[0] * u;
+                }
+                if u >= old[n - 1] {
+                    return c[n - 1] + slope[1] * (u - old[n - 1]);
+                }
+                let k = old.partition_point(|&o| o <= u);
+                c[k - 1] + (c[k] - c[k - 1]) * (u - old[k - 1]) / (old[k] - old[k - 1])
+            };
+            GridAxis { lsb: a.lsb, controls: new.iter().map(|&u| at(u).round() as i64).collect() }
+        })
+        .collect();
+    GridPath { step: path.step, breaks, axes }
+}
+
+/// The first axis straight ahead, and a second one that swings by `height` every dozen spans.
+pub(super) fn with_wave(path: &GridPath, height: f64) -> GridPath {
+    let lsb = path.axes[0].lsb;
+    let spacing = (path.breaks[1] as f64 * path.step) / lsb;
+    let nodes = greville(path.spans(), spacing);
+    let wave = |i: usize| (height / lsb * (i as f64 * 0.5 + (i as f64 * 0.013).sin()).sin()).round() as i64;
+    let axes = vec![
+        GridAxis { lsb, controls: nodes.iter().map(|u| u.round() as i64).collect() },
+        GridAxis { lsb, controls: (0..nodes.len()).map(wave).collect() },
+    ];
+    GridPath { axes, ..path.clone() }
 }

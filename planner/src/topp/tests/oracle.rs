@@ -98,6 +98,56 @@ impl Oracle {
     }
 }
 
+/// Largest jerk^2/J^2 that Bernstein coefficients of f^2 q leave possible within the inner spans, each divided into
+/// 16 parts.
+pub(super) fn certified_jerk(problem: &Problem, table: &FeedTable) -> f64 {
+    const PARTS: usize = 16;
+    let path = &table.path;
+    let (mut knot, mut g, mut worst) = (0u64, 0, 0.0f64);
+    for i in 0..table.spans() {
+        while path.breaks[g + 1] <= knot {
+            g += 1;
+        }
+        let offset = (knot - path.breaks[g]) as f64 * path.step;
+        knot += u64::from(table.steps[i]);
+        let SpanLaw::Quadratic { h, q } = table.law(i) else { continue };
+        for (axis, l) in problem.limits.iter().enumerate() {
+            let p = path.piece(axis, g);
+            let at = |x: f64| q[0] + x * (q[1] + x * q[2]);
+            let f = |x: f64| {
+                let u = offset + x;
+                p.third() * at(x) + 1.5 * p.second(u) * (q[1] + 2.0 * q[2] * x) + p.first(u) * q[2]
+            };
+            for part in 0..PARTS {
+                let (a, b) = (h * part as f64 / PARTS as f64, h * (part + 1) as f64 / PARTS as f64);
+                let (fb, qb) = (quadratic(f, a, b), quadratic(at, a, b));
+                let jerk = product(&product(&fb, &fb), &qb);
+                worst = jerk.into_iter().fold(worst, |w, c| w.max(c / (l.jerk * l.jerk)));
+            }
+        }
+    }
+    worst
+}
+
+/// Bernstein coefficients over [a, b] of a quadratic, from its values.
+fn quadratic(f: impl Fn(f64) -> f64, a: f64, b: f64) -> Vec<f64> {
+    let (start, middle, end) = (f(a), f(0.5 * (a + b)), f(b));
+    vec![start, 2.0 * middle - 0.5 * (start + end), end]
+}
+
+/// Bernstein coefficients of a product.
+fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+    let (n, m) = (a.len() - 1, b.len() - 1);
+    let choose = |n: usize, k: usize| (0..k).fold(1.0, |c, i| c * (n - i) as f64 / (i + 1) as f64);
+    let mut c = vec![0.0; n + m + 1];
+    for (i, a) in a.iter().enumerate() {
+        for (j, b) in b.iter().enumerate() {
+            c[i + j] += choose(n, i) * choose(m, j) / choose(n + m, i + j) * a * b;
+        }
+    }
+    c
+}
+
 /// x, dx/dt, d2x/dt2, d3x/dt3 at share `t` of a span: of its time for rest spans, of its length otherwise.
 fn motion(law: &SpanLaw, t: f64) -> (f64, f64, f64, f64) {
     match *law {
