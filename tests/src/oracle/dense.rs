@@ -39,7 +39,8 @@ pub struct Reading<T> {
     breaks: Vec<T>,
     rate: (Basis<T>, Vec<T>),
     path: Basis<T>,
-    controls: Vec<Vec<T>>,
+    /// First control point of each axis, and all of them relative to it: derivatives are those of the latter.
+    controls: Vec<(T, Vec<T>)>,
 }
 
 impl<T: Real> Reading<T> {
@@ -68,7 +69,10 @@ impl<T: Real> Reading<T> {
         let rate = (Basis::clamped(2, &knots[1..n]), controls);
         let breaks: Vec<T> = table.path.breaks.iter().map(|&b| place(b)).collect();
         let path = Basis::clamped(3, &breaks);
-        let axis = |a: &GridAxis| a.controls.iter().map(|&c| real(c as f64) * real(a.lsb)).collect();
+        let axis = |a: &GridAxis| {
+            let relative = a.controls.iter().map(|&c| real((c - a.controls[0]) as f64) * real(a.lsb));
+            (real(a.controls[0] as f64) * real(a.lsb), relative.collect())
+        };
         let controls = table.path.axes.iter().map(axis).collect();
         Self { knots, breaks, rate, path, controls }
     }
@@ -121,9 +125,9 @@ impl<T: Real> Reading<T> {
         let geometry = self.breaks.partition_point(|b| b.near() < middle).saturating_sub(1);
         let [v, a, j] = rate;
         let weights = [0, 1, 2, 3].map(|d| self.path.weights(geometry, u, d));
-        let axis = |controls: &Vec<T>| {
+        let axis = |(first, controls): &(T, Vec<T>)| {
             let [p0, p1, p2, p3] = [0, 1, 2, 3].map(|d| combine(controls, geometry, &weights[d]));
-            [p0, p1 * v, p2 * v * v + p1 * a, p3 * v * v * v + real(3.0) * p2 * v * a + p1 * j]
+            [*first + p0, p1 * v, p2 * v * v + p1 * a, p3 * v * v * v + real(3.0) * p2 * v * a + p1 * j]
         };
         Instant { u, rate, axes: self.controls.iter().map(axis).collect() }
     }

@@ -14,9 +14,6 @@ use super::spline::{Basis, combine};
 /// Samples of one arc or line, by their ends and between them.
 const PARTS: usize = 12;
 
-/// Sampled valleys of a distance that are looked into.
-const VALLEYS: usize = 3;
-
 /// Steps of a golden-section search; each leaves 0.618 of the interval.
 const STEPS: usize = 44;
 
@@ -76,26 +73,38 @@ pub fn measure(
                 at += end + 1;
                 break &legs[..=end];
             }
-            // A stretch of less than a drive count moves nothing.
-            if let Some(leg) = legs.iter().find(|l| !l.is_within_a_count(&start, machine)) {
-                return Err(Mismatch::LeftOut(leg.line));
-            }
+            stands_for(legs, &start, machine)?;
             (run, at) = (run + 1, 0);
         };
         path.compare(legs, section, per_span, &mut worst)?;
     }
-    let rest = runs.iter().skip(run).flatten().skip(at);
-    let end = plan.iter().rev().find_map(|i| if let JobItem::Section(s) = i { Some(s) } else { None });
-    let end = end.map(|s| {
-        let path = Path::of(s);
-        path.position(path.spans() - 1, path.breaks[path.spans()])
-    });
-    for leg in rest {
-        if !leg.is_within_a_count(&end.unwrap_or_default(), machine) {
-            return Err(Mismatch::LeftOut(leg.line));
-        }
+    let last = plan.iter().rev().find_map(|i| if let JobItem::Section(s) = i { Some(s) } else { None });
+    let end = last.map_or_else(Point::default, |s| Path::of(s).end);
+    for (k, legs) in runs.iter().enumerate().skip(run) {
+        stands_for(&legs[if k == run { at } else { 0 }..], &end, machine)?;
     }
     Ok(worst)
+}
+
+/// Standing at `place` stands for `legs`: they stay within the tolerance of it and end on the same counts.
+fn stands_for(legs: &[Leg], place: &Point, machine: &Machine) -> Result<(), Mismatch> {
+    let strays = |leg: &&Leg| {
+        let parts = (0..=PARTS).map(|k| leg.position(k as f64 / PARTS as f64));
+        let apart = parts.map(|p| leg.ruler.share(&p, place)).fold(0.0, f64::max);
+        apart > 1.0 && !leg.is_within_a_count(place, machine)
+    };
+    let ends = |leg: &Leg| is_near(&leg.end, place, machine);
+    match (legs.iter().find(strays), legs.last()) {
+        (Some(leg), _) => Err(Mismatch::LeftOut(leg.line)),
+        (None, Some(leg)) if !ends(leg) => Err(Mismatch::LeftOut(leg.line)),
+        _ => Ok(()),
+    }
+}
+
+/// Whether two points are the same on every drive, but for the rounding of one to counts.
+fn is_near(p: &Point, q: &Point, machine: &Machine) -> bool {
+    let axes = machine.axes.iter().zip(p.iter().zip(q));
+    axes.into_iter().all(|(axis, (a, b))| (a - b).abs() * axis.counts_per_unit < 1.5)
 }
 
 /// One programmed move with the tolerance in force on it.
@@ -165,39 +174,18 @@ impl Leg {
     }
 
     fn is_within_a_count(&self, p: &Point, machine: &Machine) -> bool {
-        let near = |q: &Point| {
-            let axes = machine.axes.iter().zip(p.iter().zip(q));
-            axes.into_iter().all(|(axis, (a, b))| (a - b).abs() * axis.counts_per_unit < 1.5)
-        };
-        (0..=PARTS).all(|k| near(&self.position(k as f64 / PARTS as f64)))
-    }
-
-    /// Shares between which the distance to `p` has one valley each, to within the sampling.
-    fn valleys(&self, p: &Point) -> Vec<[f64; 2]> {
-        let Shape::Arc(arc) = self.shape else { return vec![[0.0, 1.0]] };
-        let [x, y] = [0, 1].map(|k| p[arc.plane[k]] - arc.centre[k]);
-        let turn = std::f64::consts::TAU / arc.sweep.abs();
-        let towards = (y.atan2(x) - arc.start_angle) / arc.sweep;
-        let first = towards.rem_euclid(turn) - turn;
-        let around = 0.25 * turn;
-        let mut found = Vec::new();
-        let mut t = first;
-        while t - around <= 1.0 {
-            let valley = [(t - around).max(0.0), (t + around).min(1.0)];
-            if valley[0] < valley[1] {
-                found.push(valley);
-            }
-            t += turn;
-        }
-        found.push([0.0, (0.1 * turn).min(1.0)]);
-        found.push([(1.0 - 0.1 * turn).max(0.0), 1.0]);
-        found
+        (0..=PARTS).all(|k| is_near(&self.position(k as f64 / PARTS as f64), p, machine))
     }
 
     /// Least distance to `p` over the tolerance.
     fn distance(&self, p: &Point) -> f64 {
-        let size = |t: f64| self.ruler.share(p, &self.position(t));
-        self.valleys(p).into_iter().map(|v| lowest(v, size)).fold(f64::INFINITY, f64::min)
+        let parts = match self.shape {
+            Shape::Line => 1,
+            Shape::Arc(arc) => 8 + (24.0 * arc.sweep.abs() / std::f64::consts::TAU).ceil() as usize,
+        };
+        let places: Vec<(f64, Point)> =
+            (0..=parts).map(|k| k as f64 / parts as f64).map(|t| (t, self.position(t))).collect();
+        nearest(p, &places, |t| self.position(t), &self.ruler)
     }
 }
 
@@ -227,6 +215,26 @@ impl Ruler {
         let over = |axes: &[usize]| axes.iter().map(|&i| (p[i] - q[i]).powi(2)).sum::<f64>().sqrt();
         (over(&self.linear) / self.tolerance_mm).max(over(&self.rotary) / self.tolerance_rotary)
     }
+}
+
+/// Least distance of `p` to a curve over the tolerance, sampled at `places` and looked into where it may be lower.
+fn nearest(p: &Point, places: &[(f64, Point)], curve: impl Fn(f64) -> Point, ruler: &Ruler) -> f64 {
+    let sizes: Vec<f64> = places.iter().map(|(_, at)| ruler.share(p, at)).collect();
+    let at = |k: usize| sizes.get(k).copied().unwrap_or(f64::INFINITY);
+    let is_valley = |k: &usize| at(*k) <= at(k + 1) && (*k == 0 || at(*k) <= at(k - 1));
+    let mut valleys: Vec<usize> = (0..sizes.len()).filter(is_valley).collect();
+    valleys.sort_by(|a, b| sizes[*a].total_cmp(&sizes[*b]));
+    let mut least = f64::INFINITY;
+    for k in valleys {
+        let ends = [k.saturating_sub(1), (k + 1).min(places.len() - 1)];
+        // Between two samples the curve comes no nearer than this, give or take its bend.
+        let apart = ends.map(|e| ruler.share(&places[e].1, &places[k].1));
+        if sizes[k] - apart[0].max(apart[1]) < least {
+            let found = lowest(ends.map(|e| places[e].0), |t| ruler.share(p, &curve(t)));
+            least = least.min(found).min(sizes[k]);
+        }
+    }
+    least
 }
 
 /// Lowest value of `f` on an interval with one valley (Kiefer 1953).
@@ -366,26 +374,13 @@ impl Path {
             let reach = [self.from(block.saturating_sub(1)), self.from(block + 2)];
             let first = places.partition_point(|p| p.u < reach[0]);
             let end = places.partition_point(|p| p.u <= reach[1]);
+            let near: Vec<(f64, Point)> = places[first..end].iter().map(|p| (p.u, p.at)).collect();
             for k in 0..=PARTS {
                 let p = leg.position(k as f64 / PARTS as f64);
-                note(0.0, self.distance(&p, &places[first..end], &leg.ruler), leg);
+                note(0.0, nearest(&p, &near, |u| self.anywhere(u), &leg.ruler), leg);
             }
         }
         Ok(())
-    }
-
-    /// Least distance of `p` to the spline near `places`, over the tolerance.
-    fn distance(&self, p: &Point, places: &[Place], ruler: &Ruler) -> f64 {
-        let sizes: Vec<f64> = places.iter().map(|place| ruler.share(p, &place.at)).collect();
-        let at = |k: usize| sizes.get(k).copied().unwrap_or(f64::INFINITY);
-        let is_valley = |k: &usize| at(*k) <= at(k + 1) && (*k == 0 || at(*k) <= at(k - 1));
-        let mut valleys: Vec<usize> = (0..sizes.len()).filter(is_valley).collect();
-        valleys.sort_by(|a, b| sizes[*a].total_cmp(&sizes[*b]));
-        let refined = valleys.into_iter().take(VALLEYS).map(|k| {
-            let ends = [k.saturating_sub(1), (k + 1).min(places.len() - 1)].map(|k| places[k].u);
-            lowest(ends, |u| ruler.share(p, &self.anywhere(u))).min(sizes[k])
-        });
-        refined.fold(f64::INFINITY, f64::min)
     }
 }
 

@@ -3,6 +3,8 @@
 use planner::job::machine::Machine;
 use proptest::prelude::*;
 
+use crate::steps::quick;
+
 /// What a machine is made of.
 #[derive(Clone, Debug)]
 pub struct Frame {
@@ -29,7 +31,7 @@ fn scale(from: f64, to: f64) -> impl Strategy<Value = f64> {
 
 /// Any frame.
 pub fn frame() -> impl Strategy<Value = Frame> {
-    let drive = (2i32..=5, scale(10.0, 1500.0), scale(50.0, 20_000.0), scale(500.0, 1e6));
+    let drive = (2i32..=5, quick(10.0, 1500.0), quick(50.0, 20_000.0), quick(500.0, 1e6));
     let tick = prop::sample::select(vec![0.001, 0.0005, 0.00025, 0.002, 0.004]);
     (prop_oneof![3 => 0usize..2, 4 => 2..AXES.len()], prop::array::uniform4(drive), tick, scale(1e-3, 0.1))
         .prop_map(|(axes, drives, tick_s, tolerance_mm)| Frame { axes, drives, tick_s, tolerance_mm })

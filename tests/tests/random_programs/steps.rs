@@ -36,6 +36,9 @@ pub enum Step {
     Spindle,
 }
 
+/// How far programs stay away from the ends of travel [axis units].
+const MARGIN: f64 = 1.25;
+
 /// How blocks join.
 #[derive(Clone, Copy, Debug)]
 pub enum Mode {
@@ -48,6 +51,11 @@ pub enum Mode {
 
 fn scale(from: f64, to: f64) -> impl Strategy<Value = f64> {
     (from.ln()..to.ln()).prop_map(f64::exp)
+}
+
+/// As [`scale`], with the largest for the simplest.
+pub fn quick(from: f64, to: f64) -> impl Strategy<Value = f64> {
+    (-to.ln()..-from.ln()).prop_map(|x| (-x).exp())
 }
 
 fn towards() -> impl Strategy<Value = [f64; 4]> {
@@ -91,7 +99,7 @@ pub fn step() -> impl Strategy<Value = Step> {
         2 => Just(Step::Back),
         1 => Just(Step::Nowhere),
         1 => (0usize..4, prop::bool::ANY).prop_map(|(axis, high)| Step::Edge { axis, high }),
-        3 => scale(0.5, 60_000.0).prop_map(Step::Feed),
+        3 => quick(10.0, 60_000.0).prop_map(Step::Feed),
         1 => (towards(), length(), scale(1e-3, 5.0))
             .prop_map(|(towards, length, seconds)| Step::Timed { towards, length, seconds }),
         3 => mode().prop_map(Step::Mode),
@@ -152,7 +160,8 @@ impl<'m> Writer<'m> {
     /// The nearest point that the program can name and the machine can reach.
     fn reachable(&self, p: &[f64]) -> Vec<f64> {
         let axes = self.machine.axes.iter().zip(p);
-        axes.map(|(axis, x)| self.rounded(*x).clamp(axis.travel[0], axis.travel[1])).collect()
+        axes.map(|(axis, x)| self.rounded(*x).clamp(axis.travel[0] + MARGIN, axis.travel[1] - MARGIN))
+            .collect()
     }
 
     fn words(&self, p: &[f64]) -> String {
@@ -220,7 +229,7 @@ impl<'m> Writer<'m> {
             Step::Edge { axis, high } => {
                 let axis = axis % self.at.len();
                 let mut p = self.at.clone();
-                p[axis] = self.machine.axes[axis].travel[usize::from(high)];
+                p[axis] = self.machine.axes[axis].travel[usize::from(high)]; // clamped
                 self.go("G1", &p);
             }
             Step::Feed(f) => self.line(format!("F{f:.4}")),
@@ -254,7 +263,7 @@ impl<'m> Writer<'m> {
         let radius = i.hypot(j);
         let inside = [(a, centre[0]), (b, centre[1])].iter().all(|&(axis, c)| {
             let [low, high] = self.machine.axes[axis].travel;
-            c - 1.001 * radius >= low && c + 1.001 * radius <= high
+            c - radius >= low + MARGIN && c + radius <= high - MARGIN
         });
         if !inside || radius < 0.01 {
             return;
