@@ -59,15 +59,18 @@ fn plan_whole_up_to(whole: usize, problem: &Problem, settings: &Settings) -> Res
     let mut layout = knots::place(problem, settings, &sweep)?;
     let attempt = Attempt { whole, problem, settings, sweep: &sweep };
     let mut iterations = 0;
+    // Spans that had to be divided are short: finer codes keep rounding from slowing them.
+    let mut largest_code = rounding::SHORT_CODE;
     for _ in 0..MOST_REFINEMENTS {
-        let plan = attempt.solve(&layout, &mut iterations)?;
+        let plan = attempt.solve(&layout, largest_code, &mut iterations)?;
         let Some(parts) = check::format(&layout, &plan.table) else {
             return Ok(Plan { iterations, ..plan });
         };
         layout = knots::refine(problem.path, &layout, &parts)
             .map_err(|span| format_error(problem, &layout, &plan, span))?;
+        largest_code = rounding::LONG_CODE;
     }
-    let plan = attempt.solve(&layout, &mut iterations)?;
+    let plan = attempt.solve(&layout, largest_code, &mut iterations)?;
     match check::format(&layout, &plan.table) {
         None => Ok(Plan { iterations, ..plan }),
         Some(parts) => {
@@ -136,15 +139,16 @@ struct Attempt<'a> {
 
 impl Attempt<'_> {
     /// Solves on given knots, rounds and checks.
-    fn solve(&self, layout: &Layout, iterations: &mut u64) -> Result<Plan, PlanError> {
+    fn solve(&self, layout: &Layout, largest_code: f64, iterations: &mut u64) -> Result<Plan, PlanError> {
         let problem = self.problem;
         let unit = self.sweep.top();
         let joints = joints(problem, layout);
-        let mut source = RowSource { problem: *problem, layout, unit, ceiling: CEILING, joint: joints };
+        let mut source =
+            RowSource { problem: *problem, layout, unit, ceiling: CEILING, joint: joints, largest_code };
         let mut worst = 1;
         for _ in 0..MOST_RESCALES {
             source.joint = joints.map(|q| (q / unit).min(source.ceiling));
-            let scale = rounding::scale(unit, source.ceiling);
+            let scale = rounding::scale(&source);
             let half = rounding::halves(&source, scale, self.sweep);
             if let Some(x) = self.optimise(&source, &half, iterations) {
                 let table = rounding::table(&source, scale, &x);
@@ -156,7 +160,11 @@ impl Attempt<'_> {
                 worst = findings.span;
             }
             // Rounding alone breaks a limit: the codes are too coarse for the slowest places.
-            source.ceiling *= FINER;
+            if source.largest_code < rounding::LONG_CODE {
+                source.largest_code = rounding::LONG_CODE;
+            } else {
+                source.ceiling *= FINER;
+            }
         }
         Err(PlanError::Resolution { span: worst, u: layout.start(problem.path, worst) })
     }

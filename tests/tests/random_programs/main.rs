@@ -108,7 +108,7 @@ fn random_programs_hold() {
         let Err(mut finding) = outcome else { continue };
         let count = findings.entry(finding.kind).or_default();
         *count += 1;
-        println!("== case {number}: {finding}");
+        println!("== case {number} jerk {}: {finding}", tree.current().jerk);
         if std::env::var("FEEDSPLINE_ONLY").is_ok_and(|k| k != finding.kind)
             || *count > setting("FEEDSPLINE_SHRUNK", 1) as u32
         {
