@@ -1,5 +1,9 @@
 //! How much faster than the machine a simulated job runs. `cargo xtask bench` runs this.
-#![allow(missing_docs, clippy::expect_used, reason = "criterion's macros make items; a bench stops on an error")]
+#![allow(
+    missing_docs,
+    clippy::expect_used,
+    reason = "criterion's macros make items; a bench stops on an error"
+)]
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};

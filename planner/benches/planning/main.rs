@@ -1,5 +1,9 @@
 //! What planning costs, stage by stage. `cargo xtask bench` runs this.
-#![allow(missing_docs, clippy::expect_used, reason = "criterion's macros make items; a bench stops on an error")]
+#![allow(
+    missing_docs,
+    clippy::expect_used,
+    reason = "criterion's macros make items; a bench stops on an error"
+)]
 
 mod paths;
 
