@@ -33,6 +33,8 @@ pub(super) struct Fitted {
     pub(super) comparison: Comparison,
     pub(super) stops: BTreeMap<StopCause, u64>,
     pub(super) tolerance: InForce,
+    /// Size of the largest figure that standing still is within the tolerance of [mm].
+    pub(super) left_out_mm: f64,
     pub(super) seconds: f64,
 }
 
@@ -81,6 +83,7 @@ pub(super) fn plan(args: &PlanArgs, progress: &mut Progress) -> Result<Fitted, F
         progress.share(f64::from(line) / lines.max(1) as f64);
     });
     let stops = sections.stops().clone();
+    let left_out_mm = sections.left_out_mm();
     drop(sections);
     let plan = planned.map_err(|e| match e {
         JobError::Section(SectionError::Program(e)) => refused(e),
@@ -98,6 +101,7 @@ pub(super) fn plan(args: &PlanArgs, progress: &mut Progress) -> Result<Fitted, F
         comparison,
         stops,
         tolerance,
+        left_out_mm,
         seconds: begin.elapsed().as_secs_f64(),
     })
 }
