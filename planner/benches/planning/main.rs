@@ -70,7 +70,7 @@ fn plan(c: &mut Criterion) {
     for (axes, geometry) in SIZES {
         let path = paths::meander(axes, geometry);
         let limits = paths::limits(axes);
-        let problem = Problem { path: &path, limits: &limits, caps: &[], shortest_span_s: 1e-3 };
+        let problem = Problem { path: &path, limits: &limits, caps: &[], control_tick_s: 1e-3 };
         let of = |solver| Settings { solver, ..Settings::default() };
         let answer = topp::plan(&problem, &Settings::default()).expect("a smooth path has a plan");
         let other = topp::plan(&problem, &of(Solver::Clarabel)).expect("by either solver");

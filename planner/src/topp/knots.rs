@@ -210,7 +210,7 @@ impl<'a> Estimate<'a> {
             count.push(count[k - 1] + (u[k] - u[k - 1]) / h);
         }
         let top = sweep.top().sqrt();
-        let (limits, tick) = (problem.limits, problem.shortest_span_s);
+        let (limits, tick) = (problem.limits, problem.control_tick_s);
         Estimate { path, limits, tick, top, stations: u, count, clock, rest, ramp_s }
     }
 
@@ -285,7 +285,7 @@ fn ramp(problem: &Problem, sweep: &Sweep) -> f64 {
         .map(|(l, top)| (l.acceleration / l.jerk).max(SPEED_RAMP_SHARE * top / l.acceleration))
         .fold(f64::INFINITY, f64::min);
     let swept = sweep.duration();
-    if ramp.is_finite() { ramp.max(problem.shortest_span_s).max(1e-6 * swept) } else { 0.1 * swept }
+    if ramp.is_finite() { ramp.max(problem.control_tick_s).max(1e-6 * swept) } else { 0.1 * swept }
 }
 
 /// Wanted lengths of both rest spans, and J/|p'| at both ends.
@@ -303,7 +303,7 @@ fn rest_lengths(problem: &Problem, sweep: &Sweep, ramp_s: f64) -> ([f64; 2], [f6
             }
             // Acceleration saturates exactly at the joint: A^3/(6 J^2 |p'|) = A T^2/(6 |p'|) with T = A/J; where
             // jerk hardly matters, T is two ticks or a small share of the ramp.
-            let t = (l.acceleration / l.jerk).max(0.05 * ramp_s).max(2.0 * problem.shortest_span_s);
+            let t = (l.acceleration / l.jerk).max(0.05 * ramp_s).max(2.0 * problem.control_tick_s);
             length = length.min(l.acceleration * t * t / (6.0 * slope));
             jerk = jerk.min(l.jerk / slope);
         }

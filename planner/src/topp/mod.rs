@@ -96,7 +96,7 @@ fn slowed(problem: &Problem) -> Vec<AxisLimits> {
     const MOVE_TICKS: f64 = 8.0;
     const SPEED_TICKS: f64 = 6.0;
     const ACCELERATION_TICKS: f64 = 2.0;
-    let tick = problem.shortest_span_s;
+    let tick = problem.control_tick_s;
     if tick == 0.0 {
         return problem.limits.to_vec();
     }
@@ -251,6 +251,6 @@ fn joints(problem: &Problem, layout: &Layout) -> [f64; 2] {
             })
             .collect();
         let caps = strictest(problem.caps, layout.knots[i], layout.knots[i + 1]);
-        rest::joint_bound(layout.h[i], &derivatives, problem.limits, &caps, problem.shortest_span_s)
+        rest::joint_bound(layout.h[i], &derivatives, problem.limits, &caps, problem.control_tick_s)
     })
 }

@@ -15,7 +15,7 @@ use crate::job::machine::MAX_AXES;
 
 /// Spans that a drive may have to cross within a control tick. The format allows a few more; placed knots lie at
 /// least a tick apart, only divided spans are shorter.
-const SPANS_PER_TICK: f64 = 12.0;
+pub(super) const SPANS_PER_TICK: f64 = 12.0;
 
 /// What a row stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -186,7 +186,7 @@ impl RowSource<'_> {
     fn longest_enough(&self, s: usize, axes: &[Derivatives]) -> f64 {
         const ROUNDING_SHARE: f64 = 0.2;
         let step = (self.unit * self.ceiling).sqrt() / self.largest_code;
-        let tick = self.problem.shortest_span_s / SPANS_PER_TICK;
+        let tick = self.problem.control_tick_s / SPANS_PER_TICK;
         let shortest = axes
             .iter()
             .zip(self.problem.limits)
