@@ -74,6 +74,6 @@ pub fn deliver(
         .map_err(|e| Failure::internal(format!("plan.json cannot be made: {e}")))?;
     set.write("plan.json", &plan)?;
     set.commit()?;
-    console.show(&outcome.json, &summary::plan(&outcome.json));
+    console.show(&outcome.json, &summary::plan(&outcome.json))?;
     Ok(verdict)
 }
