@@ -8,6 +8,7 @@ pub mod args;
 pub mod console;
 pub mod engine;
 pub mod failure;
+pub mod interrupt;
 pub mod json;
 pub mod local;
 pub mod memory;

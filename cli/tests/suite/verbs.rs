@@ -281,7 +281,10 @@ fn bad_input_in_json_is_one_object() {
 #[test]
 fn a_broken_certificate_is_status_one_with_a_report_and_no_table() {
     let home = tempfile::tempdir().unwrap();
-    let said = say(&BROKEN, &["plan", "part.ngc", "-o", home.path().to_str().unwrap()]);
+    let words = ["plan", "part.ngc", "-o", home.path().to_str().unwrap()];
+    assert_eq!(say(&GOOD, &words).status, 0);
+    assert_eq!(names(home.path()), ["part.feed", "plan.json", "report.html"]);
+    let said = say(&BROKEN, &words);
     assert_eq!(said.status, 1);
     assert_eq!(names(home.path()), ["plan.json", "report.html"]);
     assert!(said.out.contains("DOES NOT HOLD"), "{}", said.out);
