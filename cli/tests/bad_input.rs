@@ -404,3 +404,36 @@ fn plan_verify_and_inspect_agree() {
     }
     assert_eq!(count(&inspect, "file_bytes"), fs::metadata(home.path().join("wave.feed")).unwrap().len());
 }
+
+/// A job that comes through a pipe lasts until its writer is done; the interrupt comes before.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupt_leaves_nothing_behind() {
+    let home = tempfile::tempdir().unwrap();
+    let done = |program: &str, words: &[&str]| {
+        assert!(Command::new(program).args(words).current_dir(home.path()).status().unwrap().success());
+    };
+    done("mkfifo", &["pipe.ngc"]);
+    for signal in ["-INT", "-TERM"] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_feedspline"))
+            .args(["run", "pipe.ngc", "-o", "out/deep"])
+            .current_dir(home.path())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let begin = Instant::now();
+        let partial = |path: &PathBuf| path.extension().is_some_and(|e| e == "part");
+        while !below(home.path()).iter().any(partial) && begin.elapsed() < TIME_LIMIT {
+            thread::sleep(Duration::from_millis(2));
+        }
+        assert!(below(home.path()).iter().any(partial));
+        done("kill", &[signal, &child.id().to_string()]);
+        while child.try_wait().unwrap().is_none() && begin.elapsed() < TIME_LIMIT {
+            thread::sleep(Duration::from_millis(2));
+        }
+        // Does nothing to a process that has ended.
+        child.kill().unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{signal}");
+        assert_eq!(below(home.path()), [PathBuf::from("pipe.ngc")], "{signal}");
+    }
+}

@@ -85,7 +85,7 @@ fn setting(name: &str, default: u64) -> u64 {
 
 #[test]
 fn random_programs_hold() {
-    let cases = setting("FEEDSPLINE_CASES", 40);
+    let cases = setting("FEEDSPLINE_CASES", 16);
     let seed = setting("FEEDSPLINE_SEED", 1);
     let mut bytes = [0; 32];
     bytes[..8].copy_from_slice(&seed.to_le_bytes());
