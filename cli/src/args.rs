@@ -14,7 +14,7 @@ pub struct Cli {
 }
 
 const EXIT_CODES: &str = "\
-Exit status: 0 done and certified, 1 the certificate does not hold or an internal error, 2 bad input or usage.
+Exit status: 0 done and certified, 1 the certificate does not hold or an internal error, 2 bad input or usage, 130 interrupted.
 
 Example: feedspline run jobs/cat.ngc";
 
@@ -82,7 +82,7 @@ pub struct PlanArgs {
     #[arg(long, short, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Path tolerance, instead of the program's and the machine's
-    #[arg(long, value_name = "MM", value_parser = tolerance)]
+    #[arg(long, value_name = "MM", value_parser = tolerance, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
     /// Ignore programmed feeds: only the machine limits the speed
     #[arg(long)]

@@ -1,6 +1,6 @@
 //! Where text goes: results to standard output, everything else to standard error.
 
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use serde::Serialize;
@@ -11,18 +11,20 @@ use crate::json::ErrorJson;
 
 /// The two streams, and how much to say on them.
 ///
-/// A write that fails means that nobody listens any more (a closed pipe), so it is ignored: the files have
-/// been written and the exit status still tells.
+/// A closed pipe means that nobody listens any more, so it is ignored: the files have been written and the
+/// exit status still tells. Any other write of a result that fails is a failure.
 pub struct Console<'a> {
     out: &'a mut dyn Write,
     err: &'a mut dyn Write,
     talk: Talk,
+    /// Standard output has refused a text.
+    deaf: bool,
 }
 
 impl<'a> Console<'a> {
     /// A console on two streams.
     pub fn new(out: &'a mut dyn Write, err: &'a mut dyn Write, talk: Talk) -> Self {
-        Console { out, err, talk }
+        Console { out, err, talk, deaf: false }
     }
 
     /// How much to say.
@@ -31,23 +33,40 @@ impl<'a> Console<'a> {
     }
 
     /// Shows a result: the object in JSON mode, else the text.
-    pub fn show<T: Serialize>(&mut self, object: &T, text: &str) {
+    ///
+    /// # Errors
+    /// Standard output takes no more.
+    pub fn show<T: Serialize>(&mut self, object: &T, text: &str) -> Result<(), Failure> {
         if self.talk.json {
-            if let Ok(line) = serde_json::to_string_pretty(object) {
-                let _ = writeln!(self.out, "{line}");
+            let object = serde_json::to_string_pretty(object)
+                .map_err(|e| Failure::internal(format!("the result cannot be put in JSON: {e}")))?;
+            self.say(&format!("{object}\n"))
+        } else if self.talk.quiet {
+            Ok(())
+        } else {
+            self.say(text)
+        }
+    }
+
+    /// Writes to standard output, down to the file behind it.
+    ///
+    /// # Errors
+    /// Standard output takes no more.
+    pub fn say(&mut self, text: &str) -> Result<(), Failure> {
+        match self.out.write_all(text.as_bytes()).and_then(|()| self.out.flush()) {
+            Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+                self.deaf = true;
+                Err(Failure::internal(format!("cannot write to standard output: {error}")).with_help(
+                    "Make room where standard output goes, or send it elsewhere; result files are in place.",
+                ))
             }
-        } else if !self.talk.quiet {
-            let _ = write!(self.out, "{text}");
+            _ => Ok(()),
         }
     }
 
     /// Shows a failure: a diagnostic on standard error, and in JSON mode the error object on standard output.
     pub fn fail(&mut self, failure: &Failure) {
-        if self.talk.json
-            && let Ok(line) = serde_json::to_string_pretty(&ErrorJson::from(failure))
-        {
-            let _ = writeln!(self.out, "{line}");
-        }
+        self.fail_in_json(failure);
         let theme = if std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none() {
             GraphicalTheme::unicode()
         } else {
@@ -61,6 +80,29 @@ impl<'a> Console<'a> {
         {
             text = format!("error: {failure}\n");
         }
-        let _ = write!(self.err, "{text}");
+        self.tell(&text);
+    }
+
+    /// Shows a command line that cannot be understood: `text` on standard error, and in JSON mode the error
+    /// object on standard output.
+    pub fn fail_usage(&mut self, failure: &Failure, text: &str) {
+        self.fail_in_json(failure);
+        self.tell(text);
+    }
+
+    /// In JSON mode, the error object; once standard output has refused a text, nothing.
+    fn fail_in_json(&mut self, failure: &Failure) {
+        if self.talk.json
+            && !self.deaf
+            && let Ok(object) = serde_json::to_string_pretty(&ErrorJson::from(failure))
+            && let Err(failed) = self.say(&format!("{object}\n"))
+        {
+            self.tell(&format!("{failed}\n"));
+        }
+    }
+
+    /// Writes to standard error; when that fails there is nobody left to tell.
+    fn tell(&mut self, text: &str) {
+        let _ = self.err.write_all(text.as_bytes()).and_then(|()| self.err.flush());
     }
 }

@@ -8,6 +8,7 @@ pub mod args;
 pub mod console;
 pub mod engine;
 pub mod failure;
+pub mod interrupt;
 pub mod json;
 pub mod local;
 pub mod memory;
@@ -22,9 +23,10 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use args::{Cli, Verb};
+use args::{Cli, Talk, Verb};
 use console::Console;
 use engine::Engine;
+use failure::Failure;
 
 /// Exit status of bad input and of a wrong command line.
 pub const EXIT_BAD_INPUT: u8 = 2;
@@ -44,15 +46,11 @@ pub fn status(
     out: &mut dyn std::io::Write,
     err: &mut dyn std::io::Write,
 ) -> u8 {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let json = args.iter().take_while(|word| *word != "--").any(|word| word == "--json");
     let cli = match Cli::try_parse_from(args) {
         Ok(cli) => cli,
-        Err(error) => {
-            let status = if error.use_stderr() { EXIT_BAD_INPUT } else { 0 };
-            let text = error.render();
-            // A closed stream leaves nobody to tell.
-            let _ = if status == 0 { write!(out, "{text}") } else { write!(err, "{text}") };
-            return status;
-        }
+        Err(error) => return explain(&error, &mut Console::new(out, err, Talk { json, quiet: false })),
     };
     let mut console = Console::new(out, err, cli.verb.talk());
     let result = match &cli.verb {
@@ -69,4 +67,24 @@ pub fn status(
             failure.exit_status()
         }
     }
+}
+
+/// Shows the help that was asked for, or what is wrong with the command line; returns the exit status.
+fn explain(error: &clap::Error, console: &mut Console<'_>) -> u8 {
+    let text = error.render().to_string();
+    if !error.use_stderr() {
+        return match console.say(&text) {
+            Ok(()) => 0,
+            Err(failure) => {
+                console.fail(&failure);
+                failure.exit_status()
+            }
+        };
+    }
+    let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    // The first paragraph says what is wrong, the others what would be right.
+    let (message, help) = text.split_once("\n\n").unwrap_or((&text, "For more information, try '--help'."));
+    let message = words(message.strip_prefix("error: ").unwrap_or(message));
+    console.fail_usage(&Failure::input(message).with_help(words(help)), &text);
+    EXIT_BAD_INPUT
 }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
 use crate::failure::Failure;
+use crate::interrupt;
 
 /// Files on their way into one folder.
 ///
@@ -18,6 +19,8 @@ pub struct OutputSet {
     /// Folders made for this set, outermost first.
     made: Vec<PathBuf>,
     files: Vec<(NamedTempFile, PathBuf)>,
+    /// Older results that the new ones make void.
+    void: Vec<PathBuf>,
 }
 
 impl OutputSet {
@@ -29,7 +32,9 @@ impl OutputSet {
         let missing = folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists());
         let mut made: Vec<PathBuf> = missing.map(Path::to_path_buf).collect();
         made.reverse();
-        let set = OutputSet { folder: folder.to_path_buf(), made, files: Vec::new() };
+        let set = OutputSet { folder: folder.to_path_buf(), made, files: Vec::new(), void: Vec::new() };
+        let mut pending = interrupt::pending();
+        pending.folders.extend_from_slice(&set.made);
         fs::create_dir_all(folder).map_err(|e| Failure::unwritable(folder, &e))?;
         Ok(set)
     }
@@ -54,6 +59,7 @@ impl OutputSet {
     /// It cannot be created.
     pub fn stream(&mut self, name: &str) -> Result<BufWriter<File>, Failure> {
         let path = self.folder.join(name);
+        let mut pending = interrupt::pending();
         let open = || -> io::Result<(NamedTempFile, File)> {
             if path.is_dir() {
                 return Err(io::Error::from(io::ErrorKind::IsADirectory));
@@ -64,27 +70,60 @@ impl OutputSet {
             Ok((file, handle))
         };
         let (file, handle) = open().map_err(|e| Failure::unwritable(&path, &e))?;
+        pending.files.push(file.path().to_path_buf());
         self.files.push((file, path));
         Ok(BufWriter::new(handle))
     }
 
-    /// Gives every file its own name.
+    /// Lets [`OutputSet::commit`] remove an older result that must not stand beside the new ones.
+    pub fn retire(&mut self, name: &str) {
+        self.void.push(self.folder.join(name));
+    }
+
+    /// Gives every file its own name, then removes the retired ones.
     ///
     /// # Errors
-    /// A file cannot be renamed; those already renamed are removed again.
+    /// A file cannot be renamed or removed. Those renamed before stay, for they may have taken the place of
+    /// older ones; the failure names them.
     pub fn commit(mut self) -> Result<(), Failure> {
-        let mut done: Vec<PathBuf> = Vec::new();
-        for (file, path) in std::mem::take(&mut self.files) {
-            if let Err(error) = share(&file).and_then(|()| file.persist(&path).map_err(|e| e.error)) {
-                for path in &done {
-                    // The first error is the one to tell.
-                    let _ = fs::remove_file(path);
-                }
-                return Err(Failure::unwritable(&path, &error));
+        // Held to the end: an interrupt comes before the first new name or after the last.
+        let mut pending = interrupt::pending();
+        let mut done: Vec<String> = Vec::new();
+        let incomplete = |path: &Path, error: &io::Error, done: &[String]| {
+            let failure = Failure::unwritable(path, error);
+            if done.is_empty() {
+                return failure;
             }
-            done.push(path);
+            failure.with_help(format!(
+                "The results are not complete; already new are {}. Choose another folder with --out.",
+                done.join(", ")
+            ))
+        };
+        let mut files = std::mem::take(&mut self.files).into_iter();
+        while let Some((file, path)) = files.next() {
+            let temporary = file.path().to_path_buf();
+            let renamed = share(&file).and_then(|()| file.persist(&path).map_err(|e| e.error));
+            pending.files.retain(|f| *f != temporary);
+            if let Err(error) = renamed {
+                // The others go the way of a set that is dropped.
+                self.files = files.collect();
+                drop(pending);
+                return Err(incomplete(&path, &error, &done));
+            }
+            done.push(path.display().to_string());
         }
+        pending.folders.retain(|f| !self.made.contains(f));
         self.made.clear();
+        for path in std::mem::take(&mut self.void) {
+            match fs::remove_file(&path) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    drop(pending);
+                    return Err(incomplete(&path, &error, &done));
+                }
+                _ => {}
+            }
+        }
+        drop(pending);
         Ok(())
     }
 }
@@ -103,6 +142,9 @@ fn share(_: &NamedTempFile) -> io::Result<()> {
 
 impl Drop for OutputSet {
     fn drop(&mut self) {
+        let mut pending = interrupt::pending();
+        pending.files.retain(|f| self.files.iter().all(|(file, _)| file.path() != f));
+        pending.folders.retain(|f| !self.made.contains(f));
         self.files.clear();
         for folder in self.made.iter().rev() {
             // Fails when somebody else put something in; then it stays.
@@ -155,6 +197,37 @@ mod tests {
         drop(set);
         assert_eq!(fs::read(home.path().join("one")).unwrap(), b"old");
         assert_eq!(names(home.path()), ["one"]);
+    }
+
+    #[test]
+    fn a_failed_rename_takes_nothing_away() {
+        let home = tempfile::tempdir().unwrap();
+        fs::write(home.path().join("one"), b"old").unwrap();
+        let mut set = OutputSet::open(home.path()).unwrap();
+        for name in ["one", "two", "three"] {
+            set.write(name, b"new").unwrap();
+        }
+        set.retire("void");
+        fs::write(home.path().join("void"), b"old").unwrap();
+        fs::create_dir(home.path().join("two")).unwrap();
+        let failure = set.commit().unwrap_err();
+        assert_eq!(failure.file, Some(home.path().join("two")));
+        assert!(failure.help.unwrap().contains("one"));
+        assert_eq!(fs::read(home.path().join("one")).unwrap(), b"new");
+        assert_eq!(names(home.path()), ["one", "two", "void"]);
+    }
+
+    #[test]
+    fn retired_files_go_at_commit() {
+        let home = tempfile::tempdir().unwrap();
+        fs::write(home.path().join("old"), b"old").unwrap();
+        let mut set = OutputSet::open(home.path()).unwrap();
+        set.retire("old");
+        set.retire("never there");
+        set.write("new", b"new").unwrap();
+        assert!(names(home.path()).contains(&"old".to_string()));
+        set.commit().unwrap();
+        assert_eq!(names(home.path()), ["new"]);
     }
 
     #[test]

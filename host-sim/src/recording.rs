@@ -13,6 +13,11 @@ use crate::setpoint_hash::SetpointHash;
 use crate::statistics::{ContourError, Magnitude};
 use crate::trace::{AxisSample, Place, TraceHeader, TraceRow, TraceSink};
 
+/// The drives compute span times in f32, all alike: their common path clock may differ from the plan's by this much
+/// and this share. A set-point that is early or late by so little is on the path all the same.
+const CLOCK_SKEW_S: f64 = 2e-6;
+const CLOCK_RATE: f64 = 3.2e-7;
+
 /// The axes with their servos and plants, the oracle of the plan, and the statistics of both.
 ///
 /// The drives' interpolators run one tick ahead of the servos, so that a servo knows the acceleration of the tick
@@ -30,6 +35,8 @@ pub struct Recording<'a> {
     place: Option<Place>,
     hash: SetpointHash,
     deviation: Vec<f64>,
+    errors: Vec<(f64, f64)>,
+    skew_s: f64,
     contour: ContourError,
     contour_error: Magnitude,
     points: [Vec<f64>; 2],
@@ -55,6 +62,8 @@ impl<'a> Recording<'a> {
             present: origin.iter().map(at).collect(),
             samples: vec![AxisSample::default(); loops.len()],
             deviation: vec![0.0; loops.len()],
+            errors: Vec::new(),
+            skew_s: 0.0,
             loops,
             motion: None,
             tables: 0,
@@ -122,12 +131,31 @@ impl<'a> Recording<'a> {
             self.hash.add(tick, axis as u8, s.position, s.velocity, s.acceleration);
         }
         let Some(motion) = &mut self.motion else { return };
-        let state = motion.seek(tick as f64 * self.tick_s);
+        let time = tick as f64 * self.tick_s;
+        let state = motion.seek(time);
         let counts = self.machine.axes.iter().map(|axis| axis.counts_per_unit);
-        let planned = motion.axes(&state).zip(counts).map(|(axis, counts)| axis.position * counts);
-        for ((worst, s), planned) in self.deviation.iter_mut().zip(next).zip(planned) {
-            *worst = worst.max((s.position as f64 - planned).abs());
+        // Error and planned speed of each axis [counts, counts/s].
+        let axes =
+            motion.axes(&state).zip(counts).zip(next).map(|((axis, counts), s)| {
+                (s.position as f64 - axis.position * counts, axis.velocity * counts)
+            });
+        self.errors.clear();
+        self.errors.extend(axes);
+        let (along, square) = self
+            .errors
+            .iter()
+            .fold((0.0, 0.0), |(a, q), (error, speed)| (a + error * speed, q + speed * speed));
+        let most = CLOCK_SKEW_S + CLOCK_RATE * time;
+        let early = if square > 0.0 { (along / square).clamp(-most, most) } else { 0.0 };
+        self.skew_s = self.skew_s.max(early.abs());
+        for (worst, (error, speed)) in self.deviation.iter_mut().zip(&self.errors) {
+            *worst = worst.max((error - early * speed).abs());
         }
+    }
+
+    /// Most that the drives' path clock was ahead of or behind the plan's [s].
+    pub fn skew_s(&self) -> f64 {
+        self.skew_s
     }
 
     fn measure_contour(&mut self) {

@@ -21,8 +21,11 @@ pub struct SimReport {
     pub handover_s: f64,
     /// Sending and checking the first table, before the cycle [s].
     pub preparation_s: f64,
-    /// Greatest distance of a set-point from the plan evaluated in f64 at the same time [counts].
+    /// Greatest distance of a set-point from the plan evaluated in f64 [counts], at the time of the drives' common
+    /// path clock.
     pub max_path_deviation_counts: f64,
+    /// Most that this clock was ahead of or behind the plan's [s].
+    pub max_clock_skew_s: f64,
     /// Greatest following error of any linear axis [mm].
     pub max_following_error_mm: f64,
     /// Root-mean-square following error over all linear axes and ticks [mm].

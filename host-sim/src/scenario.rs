@@ -269,6 +269,7 @@ impl<'a> Programme<'a> {
             dwell_s: self.dwell_s,
             handover_s: (cycle_time_s - self.motion_s - self.dwell_s).max(0.0),
             preparation_s: seconds(preparation),
+            max_clock_skew_s: recording.skew_s(),
             max_path_deviation_counts: axes.iter().map(|a| a.max_path_deviation_counts).fold(0.0, f64::max),
             max_following_error_mm: linear.max(),
             rms_following_error_mm: linear.rms(),

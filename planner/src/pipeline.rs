@@ -176,7 +176,7 @@ fn plan_section<E>(
     let Section { kind, path, marks } = section;
     let limits: Vec<AxisLimits> = machine.axes.iter().map(|axis| set.of(axis, kind)).collect();
     let problem =
-        Problem { path: &path, limits: &limits, caps: &marks.caps, shortest_span_s: machine.control_tick_s };
+        Problem { path: &path, limits: &limits, caps: &marks.caps, control_tick_s: machine.control_tick_s };
     let plan = topp::plan(&problem, settings).map_err(|fault| JobError::Plan {
         line: marks.line_at(fault.place().unwrap_or(0.0) / path.step),
         fault,

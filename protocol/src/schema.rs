@@ -8,7 +8,7 @@ TableHeader{version u8,table u32,spans u32,geometry_spans u32,step_exponent i8,q
 geometry_bytes u32,span_bytes u32}\
 AxisHeader{table u32,axis u8,fraction_bits u8,start i64,end i64,limits Limits,control_bytes u32}\
 Limits{velocity f32,acceleration f32,jerk ?f32}\
-geometry{length<<1|more,spans-2}span{step,code dd u16}control{point dd i64}\
+geometry{length<<1|more,spans-2}span{step,code dd u24}control{point dd i64}\
 Part[Shared,Axis]\
 HostMessage[Open TableHeader,OpenAxis AxisHeader,Data{table u32,part Part,offset u32,bytes [u8]},\
 Seal{table u32,part Part,crc u32},Start{table u32,tick u64},Stop]\

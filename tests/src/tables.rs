@@ -129,7 +129,7 @@ fn split(random: &mut Random, breaks: &[u64]) -> Vec<u32> {
 }
 
 /// Codes of a random walk of q between the rests.
-fn codes(random: &mut Random, steps: &[u32], step: f64) -> (Vec<u16>, f32) {
+fn codes(random: &mut Random, steps: &[u32], step: f64) -> (Vec<u32>, f32) {
     let n = steps.len();
     let (mut walk, roughness) = (2.0 * random.scale(2.0, 300.0).ln(), random.between(0.02, 0.7));
     let mut q: Vec<f64> = (1..n - 1)
@@ -144,7 +144,7 @@ fn codes(random: &mut Random, steps: &[u32], step: f64) -> (Vec<u16>, f32) {
     q[n - 3] /= 1.0 + 2.0 * length(n - 2) / (3.0 * length(n - 1));
     let largest = q.iter().copied().fold(0.0, f64::max);
     let scale = (largest / 65_000f64.powi(2)) as f32;
-    let codes = q.iter().map(|q| (q / f64::from(scale)).sqrt().round().clamp(1.0, 65_535.0) as u16);
+    let codes = q.iter().map(|q| (q / f64::from(scale)).sqrt().round().clamp(1.0, 65_535.0) as u32);
     (codes.collect(), scale)
 }
 

@@ -103,7 +103,7 @@ fn section(length: f64, speed: f64, curve: impl Fn(f64) -> [f64; 3]) -> PlannedS
     let launch = 6f64.powf(4.0 / 3.0) / 4.0 * JERK.powf(2.0 / 3.0);
     let q = |u: f64| 1.0 / (1.0 / (speed * speed) + 1.0 / (launch * u.min(length - u).powf(4.0 / 3.0)));
     let q_scale = (1.1 * speed * speed / f64::from(u16::MAX).powi(2)) as f32;
-    let code = |knots: u64, of: f64| (q(knots as f64 * STEP / of) / f64::from(q_scale)).sqrt().round() as u16;
+    let code = |knots: u64, of: f64| (q(knots as f64 * STEP / of) / f64::from(q_scale)).sqrt().round() as u32;
     let codes = (1..n - 1).map(|i| match i {
         1 => code(at[1], 1.0),
         _ if i == n - 2 => code(at[n - 1], 1.0),

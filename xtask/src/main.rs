@@ -29,7 +29,7 @@ enum Word {
     Lint,
     /// Everything that has to pass: format, lints, names in the documentation, all tests
     Test,
-    /// Run the benches
+    /// Run the benches; what they measure is in docs/benchmarks.md
     Bench,
     /// Build the documentation, warnings are errors
     Doc,
@@ -53,7 +53,7 @@ fn main() -> ExitCode {
         Word::Fmt => cargo(&root, &["fmt", "--all"]),
         Word::Lint => lint(&root),
         Word::Test => test(&root),
-        Word::Bench => cargo(&root, &["bench", "--workspace"]),
+        Word::Bench => cargo(&root, &["bench", "--workspace", "--locked", "--bench", "*"]),
         Word::Doc => doc(&root),
         Word::Ci => run_all(&[
             ("test", &|| test(&root)),

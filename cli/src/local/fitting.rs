@@ -12,6 +12,7 @@ use planner::job::gcode::{self, Counters, Options, ProgramError};
 use planner::job::machine::{LimitSet, Machine};
 use planner::job::program::{Corner, Item, MoveKind, StopCause, ToleranceSource};
 use planner::pipeline::{self, JobError, JobPlan};
+use planner::topp::PlanError;
 use planner::topp::problem::{Settings, Solver};
 
 use crate::args::{self, PlanArgs};
@@ -33,6 +34,8 @@ pub(super) struct Fitted {
     pub(super) comparison: Comparison,
     pub(super) stops: BTreeMap<StopCause, u64>,
     pub(super) tolerance: InForce,
+    /// Size of the largest figure that standing still is within the tolerance of [mm].
+    pub(super) left_out_mm: f64,
     pub(super) seconds: f64,
 }
 
@@ -81,6 +84,7 @@ pub(super) fn plan(args: &PlanArgs, progress: &mut Progress) -> Result<Fitted, F
         progress.share(f64::from(line) / lines.max(1) as f64);
     });
     let stops = sections.stops().clone();
+    let left_out_mm = sections.left_out_mm();
     drop(sections);
     let plan = planned.map_err(|e| match e {
         JobError::Section(SectionError::Program(e)) => refused(e),
@@ -88,7 +92,9 @@ pub(super) fn plan(args: &PlanArgs, progress: &mut Progress) -> Result<Fitted, F
             placed(e.to_string(), &args.job, Some(e.line()), None)
                 .with_help("Widen the tolerance (G64 P or --tolerance), or change the path at this line.")
         }
-        JobError::Plan { line, fault } => placed(fault.to_string(), &args.job, Some(line), None),
+        JobError::Plan { line, fault } => {
+            placed(fault.to_string(), &args.job, Some(line), None).with_help(remedy(&fault))
+        }
     })?;
     let counters = program.counters().clone();
     Ok(Fitted {
@@ -98,6 +104,7 @@ pub(super) fn plan(args: &PlanArgs, progress: &mut Progress) -> Result<Fitted, F
         comparison,
         stops,
         tolerance,
+        left_out_mm,
         seconds: begin.elapsed().as_secs_f64(),
     })
 }
@@ -162,8 +169,38 @@ fn placed(message: String, file: &Path, line: Option<u32>, column: Option<u32>) 
     }
 }
 
-/// Lines of a file; zero when it cannot be read.
+/// What to do about a section that cannot be planned.
+fn remedy(fault: &PlanError) -> &'static str {
+    match fault {
+        PlanError::Cap { .. } | PlanError::CapOrder { .. } => {
+            "Check the feed at this line: it has to be above zero."
+        }
+        PlanError::TooLong { .. } | PlanError::Slow { .. } => {
+            "Raise the feed at this line, or check the axis limits of the machine file: \
+             the motion is too slow for a table."
+        }
+        PlanError::Uneven { .. } | PlanError::Resolution { .. } => {
+            "Check the feed at this line and the axis limits of the machine file: they lie too many decades \
+             apart, or are too extreme for the control tick."
+        }
+        PlanError::Limit { .. } | PlanError::LimitCount { .. } | PlanError::AxisCount { .. } => {
+            "Check the axes and their limits in the machine file."
+        }
+        PlanError::TooShort { .. } | PlanError::NothingMoves => {
+            "Leave this move out, or check the counts per unit in the machine file: \
+             it is too short for the drives to tell."
+        }
+        PlanError::Path { .. } | PlanError::Setting { .. } => {
+            "Check the coordinates at this line, and the counts and axis limits of the machine file."
+        }
+    }
+}
+
+/// Lines of a file; zero when it cannot be read, or when reading takes away what is in it, as from a pipe.
 fn line_count(file: &Path) -> usize {
+    if !file.metadata().is_ok_and(|about| about.is_file()) {
+        return 0;
+    }
     let Ok(file) = File::open(file) else { return 0 };
     let mut reader = BufReader::with_capacity(READ_AHEAD, file);
     let mut lines = 0;

@@ -4,6 +4,7 @@ use planner::analysis::binding::{self, BindingShares};
 use planner::analysis::operations::{Operation, operations};
 use planner::analysis::shortfall::{Shortfall, Shortfalls};
 use planner::certificate::AxisRatios;
+use planner::certificate::verify::verify;
 use planner::feed::file::{FeedWriter, FileHeader};
 use planner::feed::job::JobItem;
 use planner::feed::pack::{TableBytes, pack};
@@ -124,7 +125,8 @@ fn plan_json(
     drives: Option<&Drives>,
 ) -> PlanJson {
     let Fitted { machine, plan, counters, comparison, stops, tolerance, .. } = fitted;
-    let motion_time_s = plan.sections().map(|s| s.table.duration()).sum();
+    let motion_time_s = plan.sections().fold(0.0, |sum, s| sum + s.table.duration());
+    let (tolerance_mm, raised) = tolerance_in_force(fitted);
     let linear: Vec<usize> =
         (0..machine.axes.len()).filter(|&i| machine.axes[i].kind == AxisKind::Linear).collect();
     let corner = |pick: fn(&planner::job::gcode::BoundingBox) -> &planner::job::machine::Point| {
@@ -146,10 +148,10 @@ fn plan_json(
         feed_length_mm: counters.feed_length_mm,
         rapid_length_mm: counters.rapid_length_mm,
         bounding_box_mm: BoxJson { min: corner(|b| &b.min), max: corner(|b| &b.max) },
-        tolerance_mm: tolerance.mm,
-        tolerance_source: tolerance.words().into(),
+        tolerance_mm,
+        tolerance_source: if raised { "drive counts" } else { tolerance.words() }.into(),
         max_deviation_mm: worst_deviation(fitted).0,
-        cycle_time_s: plan.items.iter().map(seconds).sum(),
+        cycle_time_s: plan.items.iter().fold(0.0, |sum, item| sum + seconds(item)),
         motion_time_s,
         constant_feed_time_s: comparison.constant_feed_time_s,
         stop_every_block_time_s: Some(comparison.stop_at_every_block_time_s),
@@ -222,26 +224,42 @@ fn bus_json(drives: &Drives) -> BusJson {
     BusJson { frames: bus.frames, bytes: bus.bytes, load: bus.load }
 }
 
-/// The largest proven deviation of a feed section [mm], and its line.
+/// The largest proven deviation of a feed section [mm], and its line; figures left out count by their size.
 fn worst_deviation(fitted: &Fitted) -> (f64, u32) {
     let feed = fitted.plan.sections().filter(|s| s.kind == MoveKind::Feed);
     feed.map(|s| (s.marks.deviation.bound_mm, s.marks.deviation.line))
-        .fold((0.0, 0), |worst, d| if d.0 > worst.0 { d } else { worst })
+        .fold((fitted.left_out_mm, 0), |worst, d| if d.0 > worst.0 { d } else { worst })
 }
 
 /// The worst of all sections' certificates.
+///
+/// It holds when a reader of the `.feed` file, who has nothing else, would find no fault either.
 fn verdict(args: &PlanArgs, fitted: &Fitted) -> CertificateJson {
     let all = &fitted.plan.certificates;
+    let mut axes = FileHeader::from(&fitted.machine).axes;
+    if args.limits == Limits::Va {
+        for axis in &mut axes {
+            (axis.limits.jerk, axis.rapid.jerk) = (f64::INFINITY, f64::INFINITY);
+        }
+    }
     let worst =
         |pick: fn(&planner::certificate::Certificate) -> f64| all.iter().map(pick).fold(0.0, f64::max);
     let feed_ratio = worst(|c| c.feed_ratio);
     CertificateJson {
-        holds: all.iter().all(|c| c.holds),
+        holds: all.iter().all(|c| c.holds) && verify(&fitted.plan.items, &axes).holds,
         velocity_ratio: worst(|c| c.velocity_ratio),
         acceleration_ratio: worst(|c| c.acceleration_ratio),
         jerk_ratio: (args.limits == Limits::Vaj).then(|| worst(|c| c.jerk_ratio)),
         feed_ratio: (feed_ratio > 0.0).then_some(feed_ratio),
     }
+}
+
+/// The largest tolerance in force [mm]; and whether it is not the one asked for, but the least that drive counts allow.
+fn tolerance_in_force(fitted: &Fitted) -> (f64, bool) {
+    let feed = fitted.plan.sections().filter(|s| s.kind == MoveKind::Feed);
+    let used = feed.map(|s| s.marks.deviation.tolerance_mm).fold(0.0, f64::max);
+    let asked = fitted.tolerance.mm;
+    if used > asked * (1.0 + 1e-9) { (used, true) } else { (asked, false) }
 }
 
 fn notes(fitted: &Fitted) -> Vec<NoteJson> {
@@ -250,6 +268,13 @@ fn notes(fitted: &Fitted) -> Vec<NoteJson> {
         JobItem::Section(_) | JobItem::Dwell { .. } => None,
     };
     let mut notes: Vec<NoteJson> = fitted.plan.items.iter().filter_map(note).collect();
+    if fitted.left_out_mm > 0.0 {
+        let text = format!(
+            "moves of up to {:.4} mm are left out: the tolerance allows to stand still",
+            fitted.left_out_mm
+        );
+        notes.push(NoteJson { line: 1, text });
+    }
     notes.sort_by_key(|note| note.line);
     notes
 }

@@ -17,6 +17,6 @@ pub fn execute(
     console: &mut Console<'_>,
 ) -> Result<Verdict, Failure> {
     let result = engine.inspect(&args.file)?;
-    console.show(&result, &summary::inspect(&result));
+    console.show(&result, &summary::inspect(&result))?;
     Ok(Verdict::Holds)
 }

@@ -64,8 +64,11 @@ pub fn deliver(
     let verdict = Verdict::of(outcome.json.certificate.holds);
     let show = |path: &Path| Some(path.display().to_string());
     let files = &mut outcome.json.files;
-    if verdict == Verdict::Holds {
-        files.feed = show(&set.write(&format!("{}.feed", stem(&args.job)?), &outcome.feed)?);
+    let feed = format!("{}.feed", stem(&args.job)?);
+    match verdict {
+        Verdict::Holds => files.feed = show(&set.write(&feed, &outcome.feed)?),
+        // The table of an earlier run is not what the new report is about.
+        Verdict::Broken => set.retire(&feed),
     }
     files.report = show(&set.write("report.html", report::page(&outcome.report).as_bytes())?);
     files.trace = trace.as_deref().and_then(show);
@@ -74,6 +77,6 @@ pub fn deliver(
         .map_err(|e| Failure::internal(format!("plan.json cannot be made: {e}")))?;
     set.write("plan.json", &plan)?;
     set.commit()?;
-    console.show(&outcome.json, &summary::plan(&outcome.json));
+    console.show(&outcome.json, &summary::plan(&outcome.json))?;
     Ok(verdict)
 }

@@ -20,6 +20,6 @@ pub fn execute(
     let mut progress = Progress::new(console.talk());
     let result = engine.verify(&args.file, &mut progress)?;
     drop(progress);
-    console.show(&result, &summary::verify(&result));
+    console.show(&result, &summary::verify(&result))?;
     Ok(Verdict::of(result.certificate.holds))
 }

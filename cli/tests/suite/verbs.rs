@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 use cli::args::{PlanArgs, RunArgs};
@@ -281,7 +281,10 @@ fn bad_input_in_json_is_one_object() {
 #[test]
 fn a_broken_certificate_is_status_one_with_a_report_and_no_table() {
     let home = tempfile::tempdir().unwrap();
-    let said = say(&BROKEN, &["plan", "part.ngc", "-o", home.path().to_str().unwrap()]);
+    let words = ["plan", "part.ngc", "-o", home.path().to_str().unwrap()];
+    assert_eq!(say(&GOOD, &words).status, 0);
+    assert_eq!(names(home.path()), ["part.feed", "plan.json", "report.html"]);
+    let said = say(&BROKEN, &words);
     assert_eq!(said.status, 1);
     assert_eq!(names(home.path()), ["plan.json", "report.html"]);
     assert!(said.out.contains("DOES NOT HOLD"), "{}", said.out);
@@ -315,6 +318,50 @@ fn usage_errors_are_status_two_and_help_is_not_an_error() {
     assert_eq!(help.status, 0);
     assert!(help.out.contains("Example: feedspline run"));
     assert_eq!(say(&GOOD, &["plan", ".."]).status, 2);
+}
+
+#[test]
+fn usage_errors_in_json_are_one_object() {
+    for (words, part) in [
+        (vec!["plan", "--json"], "required arguments"),
+        (vec!["plan", "a.ngc", "--json", "--tolerance", "-1"], "zero or more"),
+        (vec!["run", "a.ngc", "--json", "--speed", "3"], "--speed"),
+    ] {
+        let said = say(&GOOD, &words);
+        let error = &json(&said)["error"];
+        assert_eq!((said.status, &error["kind"]), (2, &"input".into()), "{error}");
+        assert!(error["message"].as_str().unwrap().contains(part), "{error}");
+        assert!(error["help"].as_str().unwrap().contains("--help"), "{error}");
+        assert!(said.err.starts_with("error: "), "{}", said.err);
+    }
+    assert_eq!(say(&GOOD, &["plan", "--", "--json", "b.ngc"]).out, "");
+}
+
+/// A stream with no room.
+struct Full(ErrorKind);
+
+impl Write for Full {
+    fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+        Err(self.0.into())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_full_standard_output_is_a_failure_and_a_closed_one_is_not() {
+    for words in [&["inspect", "a.feed"][..], &["verify", "a.feed", "--json"], &["--help"]] {
+        let args = || ["feedspline"].iter().chain(words).map(Into::into).collect::<Vec<_>>();
+        let mut err = Vec::new();
+        assert_eq!(cli::status(args(), &GOOD, &mut Full(ErrorKind::StorageFull), &mut err), 1, "{words:?}");
+        let err = String::from_utf8(err).unwrap();
+        assert_eq!(err.matches("standard output:").count(), 1, "{err}");
+        let mut err = Vec::new();
+        assert_eq!(cli::status(args(), &GOOD, &mut Full(ErrorKind::BrokenPipe), &mut err), 0, "{words:?}");
+        assert!(err.is_empty());
+    }
 }
 
 #[test]

@@ -212,8 +212,8 @@ fn length(view: &TableView<'_>, span: Span) -> f32 {
 
 /// q of a span's code [u^2/s^2].
 fn value(view: &TableView<'_>, span: Span) -> f32 {
-    let code = u32::from(span.code);
-    (code * code) as f32 * view.header.q_scale
+    let code = span.code as f32;
+    code * code * view.header.q_scale
 }
 
 /// Rest span: x = h (t/T)^3, `rate` = 1/T.

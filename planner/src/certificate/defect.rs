@@ -6,7 +6,7 @@ use thiserror::Error;
 use crate::feed::table::{FeedTable, MIN_SPANS};
 use crate::job::machine::MAX_AXES;
 
-/// Range of every unit size in a table: keeps squares and cubes of any table far from overflow and underflow.
+/// Range of every unit size in a table, of q the square root: keeps squares and cubes of any table far from overflow and underflow.
 const UNIT_SIZES: std::ops::RangeInclusive<f64> = 1e-15..=1e15;
 
 /// Largest integer difference: exact in an f64.
@@ -90,8 +90,9 @@ pub(super) fn check(table: &FeedTable) -> Result<(), TableDefect> {
     {
         return Err(TableDefect::ListLengths);
     }
-    let sizes = [path.step, f64::from(table.q_scale)];
-    if !path.axes.iter().map(|a| a.lsb).chain(sizes).all(|s| UNIT_SIZES.contains(&s)) {
+    let lsbs = path.axes.iter().map(|a| a.lsb);
+    let sizes = lsbs.chain([path.step, f64::from(table.q_scale).sqrt()]);
+    if !sizes.into_iter().all(|s| UNIT_SIZES.contains(&s)) {
         return Err(TableDefect::UnitSize);
     }
     if let Some(code) = table.codes.iter().position(|&c| c == 0) {

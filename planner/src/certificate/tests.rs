@@ -117,7 +117,7 @@ fn long_tables_give_the_same_on_any_number_of_threads() {
         GridAxis { lsb: 1e-4, controls: controls(|t| 4e4 * (0.033 * t).cos()) },
     ];
     let path = GridPath { step: 0.01, breaks: (0..=u64::from(n)).map(|i| 20 * i).collect(), axes };
-    let codes = (0..n - 2).map(|i| 3000 + (500.0 * f64::from(i).sin()) as u16).collect();
+    let codes = (0..n - 2).map(|i| 3000 + (500.0 * f64::from(i).sin()) as u32).collect();
     let table = FeedTable { path, steps: vec![20; n as usize], q_scale: 1e-6, codes };
     let caps = [FeedCap { until: 20_005, speed: SpeedCap::Rate(4.0) }];
     let run = |threads: usize| {

@@ -263,8 +263,9 @@ fn prove(section: &PlannedSection, axes: &[FileAxis]) -> TableProof {
     }
     let ranges: Vec<_> = (0..limits.len()).map(|axis| position_bounds(table, axis)).collect();
     for (axis, (&[low, high], machine)) in ranges.iter().zip(axes).enumerate() {
-        let count = 1.0 / machine.counts_per_unit;
-        if low < machine.travel[0] - count || high > machine.travel[1] + count {
+        // The program stays inside; the path may swing out of it by its tolerance, and an end by rounding.
+        let room = 1.0 / machine.counts_per_unit + marks.deviation.tolerance_mm * machine.tolerance_scale;
+        if low < machine.travel[0] - room || high > machine.travel[1] + room {
             faults.push(FaultCause::Travel { axis, low, high });
         }
     }

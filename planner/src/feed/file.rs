@@ -36,7 +36,7 @@ pub const FILE_VERSION: u16 = 1;
 const SCHEMA: &str = "\
 FileHeader{name str,tick_ns u32,axes [FileAxis]}\
 FileAxis{name str,kind[Linear,Rotary],unit[Mm,Deg,Rad],counts_per_unit f64,travel [f64;2],limits AxisLimits,\
-rapid AxisLimits}AxisLimits{velocity f64,acceleration f64,jerk f64}\
+rapid AxisLimits,tolerance_scale f64}AxisLimits{velocity f64,acceleration f64,jerk f64}\
 Item[Section{kind[Rapid,Feed],limits [AxisLimits],lsbs [f64],header TableHeader,shared [u8],\
 axes [{header AxisHeader,controls [u8]}],caps [{length u64,speed[None,Tangential{axes u16,speed f64},Rate f64]}],\
 blocks [{length u64,line i64 delta}],deviation{tolerance_mm f64,bound_mm f64,line u32},end StopCause},\
@@ -76,6 +76,8 @@ pub struct FileAxis {
     pub limits: AxisLimits,
     /// Limits of rapid moves.
     pub rapid: AxisLimits,
+    /// A section whose deviation from the program may be d mm may leave this axis' travel by d times this.
+    pub tolerance_scale: f64,
 }
 
 /// What the file holds; its end record says so, and a reader counts again.
@@ -114,6 +116,7 @@ impl From<&Axis> for FileAxis {
             travel: axis.travel,
             limits: axis.limits,
             rapid: axis.rapid,
+            tolerance_scale: 1.0,
         }
     }
 }
@@ -123,9 +126,18 @@ impl From<&Machine> for FileHeader {
         Self {
             name: machine.name.clone(),
             tick_ns: (machine.control_tick_s * 1e9).round() as u32,
-            axes: machine.axes.iter().map(FileAxis::from).collect(),
+            axes: machine.axes.iter().map(|axis| with_tolerance(axis, machine)).collect(),
         }
     }
+}
+
+/// On rotary axes a tolerance in mm counts as so many units as the machine's two tolerances say.
+fn with_tolerance(axis: &Axis, machine: &Machine) -> FileAxis {
+    let tolerance_scale = match axis.kind {
+        AxisKind::Linear => 1.0,
+        AxisKind::Rotary => machine.tolerance_rotary / machine.tolerance_mm,
+    };
+    FileAxis { tolerance_scale, ..FileAxis::from(axis) }
 }
 
 impl FileHeader {

@@ -20,7 +20,7 @@ pub struct FeedTable {
     /// Size of one squared code [u^2/s^2].
     pub q_scale: f32,
     /// `steps.len() - 2` codes, all positive.
-    pub codes: Vec<u16>,
+    pub codes: Vec<u32>,
 }
 
 /// q on one span, in powers of x = u - U_i; or a rest span.
@@ -61,9 +61,9 @@ impl FeedTable {
     }
 
     /// Value of one code [u^2/s^2]; exactly the drive's number.
-    pub fn value(&self, code: u16) -> f64 {
-        let squared = u32::from(code) * u32::from(code);
-        f64::from(squared as f32 * self.q_scale)
+    pub fn value(&self, code: u32) -> f64 {
+        let code = code as f32;
+        f64::from(code * code * self.q_scale)
     }
 
     /// Control value of inner span `i` (1..=n-2), the two next to rest spans derived.

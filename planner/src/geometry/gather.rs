@@ -23,6 +23,8 @@ pub(super) struct Gather {
     kind: Option<MoveKind>,
     corner: Option<Corner>,
     tail: Option<Tail>,
+    /// Size of the largest figure that became no primitive at all [mm].
+    left_out: f64,
 }
 
 /// Lines that ended so close to the last kept point that they have become no primitive yet.
@@ -44,10 +46,17 @@ impl Gather {
         self.kind.is_none()
     }
 
+    /// Size of the largest figure so far that was within the tolerance of standing still [mm].
+    pub(super) fn left_out(&self) -> f64 {
+        self.left_out
+    }
+
     /// Takes what has been gathered.
     pub(super) fn take(&mut self) -> Option<(Contour, MoveKind)> {
         self.flush();
+        let left_out = self.left_out;
         let taken = std::mem::take(self);
+        self.left_out = left_out;
         taken.kind.filter(|_| !taken.contour.primitives.is_empty()).map(|kind| (taken.contour, kind))
     }
 
@@ -211,6 +220,11 @@ impl Gather {
     fn flush(&mut self) {
         let Some(tail) = self.tail.take() else { return };
         if distance(&tail.start, &tail.end) == 0.0 {
+            // The figure came back to where it began: the path stays there, as far away as the figure reached.
+            match self.contour.primitives.last_mut() {
+                Some(last) => last.slack = last.slack.max(tail.ball),
+                None => self.left_out = self.left_out.max(tail.ball),
+            }
             return;
         }
         let (mut p, length) = Primitive::line(&tail.start, &tail.end, tail.tolerance, tail.feed, tail.line);

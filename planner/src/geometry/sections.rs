@@ -214,6 +214,11 @@ impl<I> Sections<I> {
         &self.stops
     }
 
+    /// Size of the largest figure that was left out, since standing still is within its tolerance [mm].
+    pub fn left_out_mm(&self) -> f64 {
+        self.gather.left_out()
+    }
+
     /// Where the drives stand after the last section [counts].
     pub fn counts(&self) -> Option<&[i64]> {
         self.at.as_deref()

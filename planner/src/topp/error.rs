@@ -211,8 +211,8 @@ pub(super) fn validate(problem: &Problem) -> Result<(), PlanError> {
     }
     validate_path(problem)?;
     validate_caps(problem)?;
-    if !(problem.shortest_span_s >= 0.0 && problem.shortest_span_s < 0.1) {
-        return Err(PlanError::Setting { name: "shortest_span_s", value: problem.shortest_span_s });
+    if !(problem.control_tick_s >= 0.0 && problem.control_tick_s < 0.1) {
+        return Err(PlanError::Setting { name: "control_tick_s", value: problem.control_tick_s });
     }
     Ok(())
 }

@@ -17,6 +17,8 @@ const LONGEST_S: f64 = 0.4;
 /// below one per cent.
 const FEWEST_SPANS: f64 = 32.0;
 const FEWEST_ALL_JERK: f64 = 48.0;
+/// Most that a span beside a divided one may be longer.
+const MOST_UNEVEN: f64 = 4.0;
 /// Longest step of a table [grid steps].
 const LONGEST_STEP: f64 = (1u64 << 31) as f64;
 /// Most spans of one table: beyond, memory would not do.
@@ -60,7 +62,20 @@ pub(super) fn place(problem: &Problem, settings: &Settings, sweep: &Sweep) -> Re
 }
 
 /// Divides each span `i` into `parts[i]` parts of about equal length; the error is a span too short for that.
+///
+/// Neighbours of divided spans are divided too where they would be left much longer: a spline with knots at very
+/// uneven distances bends too much beside the short ones.
 pub(super) fn refine(path: &GridPath, layout: &Layout, parts: &[u32]) -> Result<Layout, usize> {
+    let mut parts = parts.to_vec();
+    let last = layout.spans() - 1;
+    let mut grade = |i: usize, from: usize| {
+        let part = |i: usize, parts: &[u32]| layout.h[i] / f64::from(parts[i]);
+        while i != 0 && i != last && part(i, &parts) > MOST_UNEVEN * part(from, &parts) {
+            parts[i] *= 2;
+        }
+    };
+    (1..=last).for_each(|i| grade(i, i - 1));
+    (0..last).rev().for_each(|i| grade(i, i + 1));
     let mut knots = vec![0];
     let mut cells = Vec::with_capacity(layout.spans());
     for (i, &parts) in parts.iter().enumerate() {
@@ -195,7 +210,7 @@ impl<'a> Estimate<'a> {
             count.push(count[k - 1] + (u[k] - u[k - 1]) / h);
         }
         let top = sweep.top().sqrt();
-        let (limits, tick) = (problem.limits, problem.shortest_span_s);
+        let (limits, tick) = (problem.limits, problem.control_tick_s);
         Estimate { path, limits, tick, top, stations: u, count, clock, rest, ramp_s }
     }
 
@@ -218,7 +233,8 @@ impl<'a> Estimate<'a> {
         for (axis, l) in self.limits.iter().enumerate() {
             let piece = path.piece(axis, g);
             let slope = Derivatives::of(&piece, 0.0, piece.length).first_max();
-            noise = noise.max(rounding::shortest_s(slope, l, self.top, ROUNDING_SHARE));
+            noise =
+                noise.max(rounding::shortest_s(slope, l, self.top / rounding::SHORT_CODE, ROUNDING_SHARE));
         }
         noise.max(CLEAR * self.tick)
     }
@@ -269,7 +285,7 @@ fn ramp(problem: &Problem, sweep: &Sweep) -> f64 {
         .map(|(l, top)| (l.acceleration / l.jerk).max(SPEED_RAMP_SHARE * top / l.acceleration))
         .fold(f64::INFINITY, f64::min);
     let swept = sweep.duration();
-    if ramp.is_finite() { ramp.max(problem.shortest_span_s).max(1e-6 * swept) } else { 0.1 * swept }
+    if ramp.is_finite() { ramp.max(problem.control_tick_s).max(1e-6 * swept) } else { 0.1 * swept }
 }
 
 /// Wanted lengths of both rest spans, and J/|p'| at both ends.
@@ -287,7 +303,7 @@ fn rest_lengths(problem: &Problem, sweep: &Sweep, ramp_s: f64) -> ([f64; 2], [f6
             }
             // Acceleration saturates exactly at the joint: A^3/(6 J^2 |p'|) = A T^2/(6 |p'|) with T = A/J; where
             // jerk hardly matters, T is two ticks or a small share of the ramp.
-            let t = (l.acceleration / l.jerk).max(0.05 * ramp_s).max(2.0 * problem.shortest_span_s);
+            let t = (l.acceleration / l.jerk).max(0.05 * ramp_s).max(2.0 * problem.control_tick_s);
             length = length.min(l.acceleration * t * t / (6.0 * slope));
             jerk = jerk.min(l.jerk / slope);
         }

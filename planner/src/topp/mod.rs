@@ -56,23 +56,33 @@ fn plan_whole_up_to(whole: usize, problem: &Problem, settings: &Settings) -> Res
     let limits = slowed(problem);
     let problem = &Problem { limits: &limits, ..*problem };
     let sweep = Sweep::new(problem);
-    let mut layout = knots::place(problem, settings, &sweep)?;
+    let placed = knots::place(problem, settings, &sweep)?;
+    let mut layout = placed.clone();
     let attempt = Attempt { whole, problem, settings, sweep: &sweep };
     let mut iterations = 0;
+    // Spans that had to be divided are short: finer codes keep rounding from slowing them.
+    let mut largest_code = rounding::SHORT_CODE;
     for _ in 0..MOST_REFINEMENTS {
-        let plan = attempt.solve(&layout, &mut iterations)?;
+        let plan = attempt.solve(&layout, largest_code, &mut iterations)?;
         let Some(parts) = check::format(&layout, &plan.table) else {
             return Ok(Plan { iterations, ..plan });
         };
-        layout = knots::refine(problem.path, &layout, &parts)
-            .map_err(|span| format_error(problem, &layout, &plan, span))?;
+        layout = match knots::refine(problem.path, &layout, &parts) {
+            Ok(refined) => refined,
+            Err(span) => {
+                let fault = format_error(problem, &layout, &plan, span);
+                return attempt.gentle(&placed, &mut iterations).ok_or(fault);
+            }
+        };
+        largest_code = rounding::LONG_CODE;
     }
-    let plan = attempt.solve(&layout, &mut iterations)?;
+    let plan = attempt.solve(&layout, largest_code, &mut iterations)?;
     match check::format(&layout, &plan.table) {
         None => Ok(Plan { iterations, ..plan }),
         Some(parts) => {
             let span = parts.iter().position(|&p| p > 1).unwrap_or(0);
-            Err(format_error(problem, &layout, &plan, span))
+            let fault = format_error(problem, &layout, &plan, span);
+            attempt.gentle(&placed, &mut iterations).ok_or(fault)
         }
     }
 }
@@ -86,7 +96,7 @@ fn slowed(problem: &Problem) -> Vec<AxisLimits> {
     const MOVE_TICKS: f64 = 8.0;
     const SPEED_TICKS: f64 = 6.0;
     const ACCELERATION_TICKS: f64 = 2.0;
-    let tick = problem.shortest_span_s;
+    let tick = problem.control_tick_s;
     if tick == 0.0 {
         return problem.limits.to_vec();
     }
@@ -136,15 +146,16 @@ struct Attempt<'a> {
 
 impl Attempt<'_> {
     /// Solves on given knots, rounds and checks.
-    fn solve(&self, layout: &Layout, iterations: &mut u64) -> Result<Plan, PlanError> {
+    fn solve(&self, layout: &Layout, largest_code: f64, iterations: &mut u64) -> Result<Plan, PlanError> {
         let problem = self.problem;
         let unit = self.sweep.top();
         let joints = joints(problem, layout);
-        let mut source = RowSource { problem: *problem, layout, unit, ceiling: CEILING, joint: joints };
+        let mut source =
+            RowSource { problem: *problem, layout, unit, ceiling: CEILING, joint: joints, largest_code };
         let mut worst = 1;
         for _ in 0..MOST_RESCALES {
             source.joint = joints.map(|q| (q / unit).min(source.ceiling));
-            let scale = rounding::scale(unit, source.ceiling);
+            let scale = rounding::scale(&source);
             let half = rounding::halves(&source, scale, self.sweep);
             if let Some(x) = self.optimise(&source, &half, iterations) {
                 let table = rounding::table(&source, scale, &x);
@@ -156,9 +167,47 @@ impl Attempt<'_> {
                 worst = findings.span;
             }
             // Rounding alone breaks a limit: the codes are too coarse for the slowest places.
-            source.ceiling *= FINER;
+            if source.largest_code < rounding::LONG_CODE {
+                source.largest_code = rounding::LONG_CODE;
+            } else {
+                source.ceiling *= FINER;
+            }
         }
         Err(PlanError::Resolution { span: worst, u: layout.start(problem.path, worst) })
+    }
+
+    /// A plan between the smooth start and the fastest motion, as near the latter as limits and format allow: for
+    /// paths on which the fastest motion changes its speed more sharply than spans can follow.
+    fn gentle(&self, layout: &Layout, iterations: &mut u64) -> Option<Plan> {
+        const SHARES: [f64; 7] = [0.9, 0.75, 0.5, 0.25, 0.1, 0.03, 0.0];
+        const SCALINGS: usize = 40;
+        let unit = self.sweep.top();
+        let joint = joints(self.problem, layout).map(|q| (q / unit).min(CEILING));
+        let (problem, largest_code) = (*self.problem, rounding::LONG_CODE);
+        let source = RowSource { problem, layout, unit, ceiling: CEILING, joint, largest_code };
+        let scale = rounding::scale(&source);
+        let half = rounding::halves(&source, scale, self.sweep);
+        let sound = |x: &[f64]| {
+            let table = rounding::table(&source, scale, x);
+            let findings = check::rows(&source, &rounding::values(&source, &table), &half);
+            let keeps = findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC;
+            let plan = Plan { table, binding: findings.binding, iterations: 0 };
+            (keeps && check::format(layout, &plan.table).is_none()).then_some(plan)
+        };
+        let mut slow = start::profile(&source);
+        let slowest = (0..SCALINGS).find_map(|_| {
+            let plan = sound(&slow);
+            if plan.is_none() {
+                slow.iter_mut().for_each(|x| *x *= 0.8);
+            }
+            plan
+        })?;
+        let fast = self.optimise(&source, &half, iterations).unwrap_or_else(|| slow.clone());
+        let between = |share: f64| -> Vec<f64> {
+            slow.iter().zip(&fast).map(|(slow, fast)| slow + share * (fast - slow)).collect()
+        };
+        let plan = SHARES.iter().find_map(|&share| sound(&between(share))).unwrap_or(slowest);
+        Some(Plan { iterations: *iterations, ..plan })
     }
 
     /// Control values of minimum time; `None` where rounding alone would break a limit at any speed.
@@ -202,6 +251,6 @@ fn joints(problem: &Problem, layout: &Layout) -> [f64; 2] {
             })
             .collect();
         let caps = strictest(problem.caps, layout.knots[i], layout.knots[i + 1]);
-        rest::joint_bound(layout.h[i], &derivatives, problem.limits, &caps, problem.shortest_span_s)
+        rest::joint_bound(layout.h[i], &derivatives, problem.limits, &caps, problem.control_tick_s)
     })
 }

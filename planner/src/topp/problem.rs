@@ -14,8 +14,9 @@ pub struct Problem<'a> {
     pub limits: &'a [AxisLimits],
     /// Caps on the path speed, consecutive, the last one ending with the path.
     pub caps: &'a [FeedCap],
-    /// Shortest time a span may take: one control tick [s].
-    pub shortest_span_s: f64,
+    /// Control tick of the drives [s]; 0 where none plays the table. Spans are placed a tick apart or more; those that
+    /// had to be divided may be as short as a twelfth of it.
+    pub control_tick_s: f64,
 }
 
 /// How to solve it.

@@ -6,24 +6,26 @@ use super::sweep::Sweep;
 use crate::feed::table::FeedTable;
 use crate::job::machine::AxisLimits;
 
-/// Largest code of a table.
-const LARGEST_CODE: f64 = 65535.0;
+/// Largest code of a table that 16 bits serve.
+pub(super) const SHORT_CODE: f64 = 65535.0;
+/// Largest code of a table whose slow or short spans need finer ones.
+pub(super) const LONG_CODE: f64 = 4_194_303.0;
 /// Relative error of a value computed by the drive in f32: the square's conversion and one product.
 const SINGLE: f64 = 1.3e-7;
 
 /// Size of a squared code such that control values up to `ceiling` V^2 have a code.
-pub(super) fn scale(unit: f64, ceiling: f64) -> f32 {
-    let exact = unit * ceiling / (LARGEST_CODE * LARGEST_CODE);
+pub(super) fn scale(rows: &RowSource) -> f32 {
+    let exact = rows.unit * rows.ceiling / (rows.largest_code * rows.largest_code);
     let single = exact as f32;
     if f64::from(single) < exact { single.next_up() } else { single }
 }
 
 /// Shortest crossing time of a span in which rounding takes at most `share` of an axis' limits.
 ///
-/// With c off by half a code, sqrt(c s), jerk is off by 2 |p'| top/(65535 J T^2) and acceleration by
-/// |p'| top/(65535 A T), both relative to their limits and alike at any speed; `top` is the du/dt of the largest code.
-pub(super) fn shortest_s(slope: f64, limits: &AxisLimits, top: f64, share: f64) -> f64 {
-    let unit = slope * top / (LARGEST_CODE * share);
+/// With c off by half a code, sqrt(c s), jerk is off by 2 |p'| top/(K J T^2) and acceleration by
+/// |p'| top/(K A T), both relative to their limits and alike at any speed; `step` is top/K, the du/dt of code 1.
+pub(super) fn shortest_s(slope: f64, limits: &AxisLimits, step: f64, share: f64) -> f64 {
+    let unit = slope * step / share;
     (2.0 * unit / limits.jerk).sqrt().max(unit / limits.acceleration)
 }
 
@@ -66,7 +68,7 @@ pub(super) fn table(rows: &RowSource, scale: f32, x: &[f64]) -> FeedTable {
     let fold = rows.fold();
     let s = f64::from(scale);
     let root = |x: f64| (x * rows.unit / s).sqrt();
-    let code = |k: f64| k.clamp(1.0, LARGEST_CODE) as u16;
+    let code = |k: f64| k.clamp(1.0, rows.largest_code) as u32;
     let codes = (0..m)
         .map(|j| {
             if j == 0 {

@@ -13,6 +13,10 @@ use super::problem::Problem;
 use super::rounding;
 use crate::job::machine::MAX_AXES;
 
+/// Spans that a drive may have to cross within a control tick. The format allows a few more; placed knots lie at
+/// least a tick apart, only divided spans are shorter.
+pub(super) const SPANS_PER_TICK: f64 = 12.0;
+
 /// What a row stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
@@ -52,6 +56,8 @@ pub(super) struct RowSource<'a> {
     pub(super) ceiling: f64,
     /// Bounds on x at the two joints with the rest spans.
     pub(super) joint: [f64; 2],
+    /// The largest code.
+    pub(super) largest_code: f64,
 }
 
 impl RowSource<'_> {
@@ -175,14 +181,16 @@ impl RowSource<'_> {
         }
     }
 
-    /// Largest x on inner span `s` at which the span is as long as it must be: a control tick, and what rounding needs.
+    /// Largest x on inner span `s` at which the span is as long as it must be: a share of the control tick, and what
+    /// rounding needs.
     fn longest_enough(&self, s: usize, axes: &[Derivatives]) -> f64 {
         const ROUNDING_SHARE: f64 = 0.2;
-        let top = (self.unit * self.ceiling).sqrt();
-        let shortest =
-            axes.iter().zip(self.problem.limits).fold(self.problem.shortest_span_s, |t, (d, l)| {
-                rounding::shortest_s(d.first_max(), l, top, ROUNDING_SHARE).max(t)
-            });
+        let step = (self.unit * self.ceiling).sqrt() / self.largest_code;
+        let tick = self.problem.control_tick_s / SPANS_PER_TICK;
+        let shortest = axes
+            .iter()
+            .zip(self.problem.limits)
+            .fold(tick, |t, (d, l)| rounding::shortest_s(d.first_max(), l, step, ROUNDING_SHARE).max(t));
         (self.layout.h[s + 1] / shortest).powi(2) / self.unit
     }
 

@@ -18,14 +18,14 @@ const TICK_S: f64 = 1e-3;
 
 /// Plans, and checks everything that holds of every plan.
 fn planned(path: &GridPath, limits: &[AxisLimits], caps: &[FeedCap]) -> Plan {
-    let problem = Problem { path, limits, caps, shortest_span_s: TICK_S };
+    let problem = Problem { path, limits, caps, control_tick_s: TICK_S };
     let plan = plan(&problem, &Settings::default()).unwrap();
     Oracle::of(&problem, &plan.table).assert_sound(&problem, &plan);
     plan
 }
 
 fn refused(path: &GridPath, limits: &[AxisLimits], caps: &[FeedCap]) -> PlanError {
-    plan(&Problem { path, limits, caps, shortest_span_s: TICK_S }, &Settings::default()).unwrap_err()
+    plan(&Problem { path, limits, caps, control_tick_s: TICK_S }, &Settings::default()).unwrap_err()
 }
 
 /// Shortest time of a straight move from rest to rest under velocity, acceleration and jerk [Biagiotti2008 3.4].
@@ -68,7 +68,7 @@ fn the_shortest_moves_are_planned() {
 fn without_jerk_limits_the_sweep_is_met() {
     let path = walk(&mut Rng::new(1), 3, 20, 8.0, 0.5);
     let l = limits(3, 100.0, 500.0, f64::INFINITY);
-    let problem = Problem { path: &path, limits: &l, caps: &[], shortest_span_s: TICK_S };
+    let problem = Problem { path: &path, limits: &l, caps: &[], control_tick_s: TICK_S };
     let seconds = planned(&path, &l, &[]).table.duration();
     assert!(seconds / Sweep::new(&problem).duration() < 1.01);
 }
@@ -88,7 +88,7 @@ fn jerk_is_certified_between_the_samples() {
     for turn in [0.3, 1.5] {
         let path = walk(&mut rng, 3, 30, 8.0, turn);
         let l = limits(3, 100.0, 500.0, 1e4);
-        let problem = Problem { path: &path, limits: &l, caps: &[], shortest_span_s: TICK_S };
+        let problem = Problem { path: &path, limits: &l, caps: &[], control_tick_s: TICK_S };
         let p = planned(&path, &l, &[]);
         let ratio = certified_jerk(&problem, &p.table).sqrt();
         assert!((0.99..1.0 + 1e-6).contains(&ratio), "{ratio}");
@@ -149,7 +149,7 @@ fn the_reference_solver_agrees() {
     for (axes, turn) in [(1, 0.1), (2, 0.5), (3, 1.5), (6, 0.5)] {
         let path = walk(&mut rng, axes, 8, 8.0, turn);
         let l = limits(axes, 100.0, 500.0, 1e4);
-        let problem = Problem { path: &path, limits: &l, caps: &[], shortest_span_s: TICK_S };
+        let problem = Problem { path: &path, limits: &l, caps: &[], control_tick_s: TICK_S };
         let solve = |solver| {
             let settings = Settings { solver, relative_gap: 1e-6, ..Settings::default() };
             plan(&problem, &settings).unwrap()
@@ -166,7 +166,7 @@ fn windows_lose_almost_nothing_and_do_not_depend_on_threads() {
     let path = walk(&mut Rng::new(7), 1, 900, 4.0, 0.2);
     let path = families::with_wave(&path, 3.0);
     let l = limits(2, 100.0, 500.0, 1e4);
-    let problem = Problem { path: &path, limits: &l, caps: &[], shortest_span_s: TICK_S };
+    let problem = Problem { path: &path, limits: &l, caps: &[], control_tick_s: TICK_S };
     let settings = Settings { relative_gap: 1e-6, ..Settings::default() };
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -39,3 +39,6 @@ pub const fn nearest_count(control: i64, fraction_bits: u8) -> i64 {
     }
     (control.saturating_add(1 << (fraction_bits - 1))) >> fraction_bits
 }
+
+/// Largest code: exact in f32.
+pub const MAX_CODE: u32 = (1 << 24) - 1;

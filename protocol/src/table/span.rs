@@ -5,6 +5,7 @@
 //! first or last span of the table (those are rest spans and carry no code).
 
 use super::geometry::GeometryReader;
+use super::rules::MAX_CODE;
 use super::{Stream, TableError};
 use crate::varint::{self, SecondDifference};
 
@@ -14,7 +15,7 @@ pub struct Span {
     /// Length [grid steps], positive.
     pub step: u32,
     /// Square root of q in units of the header's scale; 0 on the two rest spans, positive on all others.
-    pub code: u16,
+    pub code: u32,
     /// The span is the first one of its geometry span.
     pub opens_geometry: bool,
 }
@@ -27,7 +28,7 @@ pub struct SpanWriter {
 
 impl SpanWriter {
     /// Appends one span: its step unless it follows from the geometry, its code unless it is a rest span.
-    pub fn push(&mut self, out: &mut impl Extend<u8>, step: Option<u32>, code: Option<u16>) {
+    pub fn push(&mut self, out: &mut impl Extend<u8>, step: Option<u32>, code: Option<u32>) {
         if let Some(step) = step {
             varint::write(out, u64::from(step));
         }
@@ -90,8 +91,8 @@ impl SpanReader {
             0
         } else {
             let word = varint::read(bytes, &mut self.at).map_err(fail)?;
-            match u16::try_from(self.codes.decode(word)) {
-                Ok(code @ 1..) => code,
+            match u32::try_from(self.codes.decode(word)) {
+                Ok(code @ 1..=MAX_CODE) => code,
                 _ => return Err(TableError::Range { stream, index }),
             }
         };

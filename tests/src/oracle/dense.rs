@@ -55,7 +55,7 @@ impl<T: Real> Reading<T> {
             knots.push(place(sum));
         }
         let n = table.steps.len();
-        let value = |k: usize| real(f64::from((u32::from(table.codes[k]).pow(2)) as f32 * table.q_scale));
+        let value = |k: usize| real(f64::from((u64::from(table.codes[k]).pow(2)) as f32 * table.q_scale));
         // At u = h (t/T)^3 the slope of q = u'^2 = 9 h^2 t^4 / T^6 against u is (4/3) q / u.
         let slope = |q: T, h: T| real(4.0) * q / (real(3.0) * h);
         let (head, tail) = (value(0), value(n - 3));

@@ -52,7 +52,7 @@ pub fn random_table(dice: &mut Dice, axes: usize, spans: usize) -> FeedTable {
     let mut code = dice.real(2000.0, 8000.0);
     let codes = (0..steps.len() - 2).map(|_| {
         code = (code * dice.real(0.87, 1.15)).clamp(500.0, 50_000.0);
-        code as u16
+        code as u32
     });
     let codes = codes.collect();
     let q_scale = dice.real(1e-6, 1e-4) as f32;

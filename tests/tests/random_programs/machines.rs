@@ -7,7 +7,7 @@ use crate::steps::quick;
 
 /// What a machine is made of.
 #[derive(Clone, Debug)]
-pub struct Frame {
+pub(crate) struct Frame {
     /// Which set of axes.
     pub axes: usize,
     /// Decimal exponents of counts per unit, and limits of every axis.
@@ -30,7 +30,7 @@ fn scale(from: f64, to: f64) -> impl Strategy<Value = f64> {
 }
 
 /// Any frame.
-pub fn frame() -> impl Strategy<Value = Frame> {
+pub(crate) fn frame() -> impl Strategy<Value = Frame> {
     let drive = (2i32..=5, quick(10.0, 1500.0), quick(50.0, 20_000.0), quick(500.0, 1e6));
     let tick = prop::sample::select(vec![0.001, 0.0005, 0.00025, 0.002, 0.004]);
     (prop_oneof![3 => 0usize..2, 4 => 2..AXES.len()], prop::array::uniform4(drive), tick, scale(1e-3, 0.1))
@@ -39,7 +39,7 @@ pub fn frame() -> impl Strategy<Value = Frame> {
 
 impl Frame {
     /// The machine file.
-    pub fn toml(&self) -> String {
+    pub(crate) fn toml(&self) -> String {
         if let Some(sample) = SAMPLES.get(self.axes) {
             return (*sample).into();
         }
@@ -56,7 +56,7 @@ impl Frame {
     }
 
     /// The machine.
-    pub fn machine(&self) -> Machine {
+    pub(crate) fn machine(&self) -> Machine {
         Machine::from_toml(&self.toml(), "random machine").unwrap_or_else(|e| panic!("{e}"))
     }
 }

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 /// One thing a program does.
 #[derive(Clone, Debug)]
-pub enum Step {
+pub(crate) enum Step {
     /// Straight, in a direction over all axes.
     Line { towards: [f64; 4], length: f64 },
     /// At rapid speed.
@@ -41,7 +41,7 @@ const MARGIN: f64 = 1.25;
 
 /// How blocks join.
 #[derive(Clone, Copy, Debug)]
-pub enum Mode {
+pub(crate) enum Mode {
     Exact,
     Stop,
     BestSpeed,
@@ -54,7 +54,7 @@ fn scale(from: f64, to: f64) -> impl Strategy<Value = f64> {
 }
 
 /// As [`scale`], with the largest for the simplest.
-pub fn quick(from: f64, to: f64) -> impl Strategy<Value = f64> {
+pub(crate) fn quick(from: f64, to: f64) -> impl Strategy<Value = f64> {
     (-to.ln()..-from.ln()).prop_map(|x| (-x).exp())
 }
 
@@ -87,7 +87,7 @@ fn mode() -> impl Strategy<Value = Mode> {
 }
 
 /// Any step.
-pub fn step() -> impl Strategy<Value = Step> {
+pub(crate) fn step() -> impl Strategy<Value = Step> {
     prop_oneof![
         12 => (towards(), length()).prop_map(|(towards, length)| Step::Line { towards, length }),
         3 => (towards(), length()).prop_map(|(towards, length)| Step::Rapid { towards, length }),
@@ -121,7 +121,7 @@ fn arc() -> impl Strategy<Value = Step> {
 }
 
 /// Writes `steps` for `machine`, with so many digits after the point.
-pub fn write(steps: &[Step], machine: &Machine, digits: usize, f: f64) -> String {
+pub(crate) fn write(steps: &[Step], machine: &Machine, digits: usize, f: f64) -> String {
     let mut writer = Writer::new(machine, digits);
     writer.line(format!("G21 G90 G94 G91.1 F{f:.3}"));
     for step in steps {

@@ -15,6 +15,7 @@ fn header() -> FileHeader {
         travel: [-10.0, f64::INFINITY],
         limits,
         rapid: AxisLimits { jerk: 1e5, ..limits },
+        tolerance_scale: 1.0,
     };
     FileHeader { name: "mill".into(), tick_ns: 1_000_000, axes: vec![axis("X"), axis("Y")] }
 }

@@ -2,7 +2,7 @@ use super::*;
 use proptest::prelude::*;
 
 /// A table with three geometry spans and nine q spans; codes and control points vary.
-pub(crate) fn sample(bumps: &[i64; 6], codes: [u16; 7]) -> FeedTable {
+pub(crate) fn sample(bumps: &[i64; 6], codes: [u32; 7]) -> FeedTable {
     let line = [0, 2000, 6000, 12_000, 15_000, 16_000];
     let axis = |offset: i64| GridAxis {
         lsb: 1.0 / 8000.0,
@@ -17,7 +17,7 @@ pub(crate) fn sample(bumps: &[i64; 6], codes: [u16; 7]) -> FeedTable {
     FeedTable { path, steps, q_scale: 1e-6, codes: codes.to_vec() }
 }
 
-pub(crate) const CODES: [u16; 7] = [9000, 14_000, 17_000, 16_000, 14_000, 11_000, 8000];
+pub(crate) const CODES: [u32; 7] = [9000, 14_000, 17_000, 16_000, 14_000, 11_000, 8000];
 
 pub(crate) fn scales() -> Vec<AxisScale> {
     let limits = AxisLimits { velocity: 100.0, acceleration: 1000.0, jerk: f64::INFINITY };
@@ -110,7 +110,7 @@ proptest! {
     #[test]
     fn tables_return_exactly(
         bumps in prop::array::uniform6(-500i64..500),
-        codes in prop::array::uniform7(0u16..600),
+        codes in prop::array::uniform7(0u32..600),
         number in any::<u32>(),
     ) {
         let table = sample(&bumps, std::array::from_fn(|i| CODES[i] + codes[i]));

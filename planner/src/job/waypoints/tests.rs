@@ -328,7 +328,7 @@ fn sections_can_be_planned_and_certified() {
                 path: &path,
                 limits: &limits,
                 caps: &marks.caps,
-                shortest_span_s: machine.control_tick_s,
+                control_tick_s: machine.control_tick_s,
             };
             let table = topp::plan(&problem, &settings).unwrap().table;
             let certificate = certify(&table, &limits, &marks.caps);

@@ -3,6 +3,7 @@
 use crate::feed::table::{FeedTable, SpanLaw};
 use crate::geometry::section::SpeedCap;
 use crate::topp::problem::{Binding, Plan, Problem};
+use crate::topp::rows::SPANS_PER_TICK;
 use crate::topp::sweep::Sweep;
 
 /// Largest ratios of value to limit that sampling finds.
@@ -87,7 +88,8 @@ impl Oracle {
         let text = format!("{self:?}");
         assert!(self.velocity <= ROOM && self.acceleration <= ROOM, "{text}");
         assert!(self.jerk <= ROOM && self.feed <= ROOM, "{text}");
-        assert!(self.shortest_s >= problem.shortest_span_s * (1.0 - 1e-6), "{text}");
+        let shortest = problem.control_tick_s / SPANS_PER_TICK;
+        assert!(self.shortest_s >= shortest * (1.0 - 1e-6), "{text}");
         assert!(self.longest_s < 1.0 && self.curved <= 0.25, "{text}");
         assert!(plan.table.codes.iter().all(|&c| c > 0));
         assert_eq!(plan.table.codes.len() + 2, plan.table.spans());

@@ -1,0 +1,50 @@
+//! What an interrupted command takes with it: temporary files, and folders made for results.
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Exit status after Ctrl-C and after a request to end: 128 and the number of SIGINT, as shells count.
+pub const EXIT_INTERRUPTED: u8 = 130;
+
+static PENDING: Mutex<Pending> = Mutex::new(Pending { files: Vec::new(), folders: Vec::new() });
+
+/// Files and folders that are nobody's before their set is complete.
+#[derive(Debug)]
+pub(crate) struct Pending {
+    /// Temporary files.
+    pub(crate) files: Vec<PathBuf>,
+    /// Folders made for results, outer before inner.
+    pub(crate) folders: Vec<PathBuf>,
+}
+
+/// The list of this process. Whoever holds it keeps an interrupt waiting.
+pub(crate) fn pending() -> MutexGuard<'static, Pending> {
+    PENDING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Pending {
+    /// Removes everything on the list.
+    fn remove(&mut self) {
+        // What is gone already, or has become somebody else's, is left.
+        for file in self.files.drain(..) {
+            let _ = fs::remove_file(file);
+        }
+        for folder in self.folders.drain(..).rev() {
+            let _ = fs::remove_dir(folder);
+        }
+    }
+}
+
+/// From now on Ctrl-C, and the request to end that a system sends, tidy up before this process ends.
+///
+/// Where a signal is ignored or handled already, as below `nohup`, everything stays as it is.
+pub fn tidy_up_on_interrupt() {
+    // Without a handler the signals end the process as ever; only temporary files may stay.
+    let _ = ctrlc::try_set_handler(|| {
+        // Held until the process is gone, so that nothing new comes up.
+        let mut pending = pending();
+        pending.remove();
+        std::process::exit(EXIT_INTERRUPTED.into());
+    });
+}
