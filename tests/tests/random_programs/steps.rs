@@ -36,9 +36,6 @@ pub(crate) enum Step {
     Spindle,
 }
 
-/// How far programs stay away from the ends of travel [axis units].
-const MARGIN: f64 = 1.25;
-
 /// How blocks join.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Mode {
@@ -100,8 +97,8 @@ pub(crate) fn step() -> impl Strategy<Value = Step> {
         1 => Just(Step::Nowhere),
         1 => (0usize..4, prop::bool::ANY).prop_map(|(axis, high)| Step::Edge { axis, high }),
         3 => quick(10.0, 60_000.0).prop_map(Step::Feed),
-        1 => (towards(), length(), scale(1e-3, 5.0))
-            .prop_map(|(towards, length, seconds)| Step::Timed { towards, length, seconds }),
+        1 => (towards(), length(), quick(10.0, 1000.0))
+            .prop_map(|(towards, length, speed)| Step::Timed { towards, length, seconds: length / speed }),
         3 => mode().prop_map(Step::Mode),
         1 => (0.0..0.2f64).prop_map(Step::Dwell),
         1 => Just(Step::Spindle),
@@ -160,8 +157,7 @@ impl<'m> Writer<'m> {
     /// The nearest point that the program can name and the machine can reach.
     fn reachable(&self, p: &[f64]) -> Vec<f64> {
         let axes = self.machine.axes.iter().zip(p);
-        axes.map(|(axis, x)| self.rounded(*x).clamp(axis.travel[0] + MARGIN, axis.travel[1] - MARGIN))
-            .collect()
+        axes.map(|(axis, x)| self.rounded(*x).clamp(axis.travel[0], axis.travel[1])).collect()
     }
 
     fn words(&self, p: &[f64]) -> String {
@@ -229,7 +225,7 @@ impl<'m> Writer<'m> {
             Step::Edge { axis, high } => {
                 let axis = axis % self.at.len();
                 let mut p = self.at.clone();
-                p[axis] = self.machine.axes[axis].travel[usize::from(high)]; // clamped
+                p[axis] = self.machine.axes[axis].travel[usize::from(high)];
                 self.go("G1", &p);
             }
             Step::Feed(f) => self.line(format!("F{f:.4}")),
@@ -263,7 +259,7 @@ impl<'m> Writer<'m> {
         let radius = i.hypot(j);
         let inside = [(a, centre[0]), (b, centre[1])].iter().all(|&(axis, c)| {
             let [low, high] = self.machine.axes[axis].travel;
-            c - radius >= low + MARGIN && c + radius <= high - MARGIN
+            c - 1.001 * radius >= low && c + 1.001 * radius <= high
         });
         if !inside || radius < 0.01 {
             return;
