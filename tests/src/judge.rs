@@ -3,8 +3,7 @@
 use std::fmt;
 
 use planner::certificate::verify::verify;
-use planner::feed::file::FeedReader;
-use planner::feed::file::{FeedWriter, FileHeader};
+use planner::feed::file::{FeedReader, FeedWriter, FileHeader};
 use planner::feed::job::JobItem;
 use planner::feed::pack::{TableBytes, pack};
 use planner::job::machine::Machine;
@@ -28,7 +27,7 @@ pub struct Figures {
     pub deviation: Deviation,
     /// Sizes of all tables.
     pub bytes: TableBytes,
-    /// Fingerprint of the set-points.
+    /// Fingerprint of the set-points; this and what follows are zero where nothing was simulated.
     pub setpoint_hash: u64,
     /// Largest distance of a set-point from the plan [counts].
     pub setpoint_deviation_counts: f64,
@@ -64,11 +63,12 @@ fn largest(a: Ratios, b: Ratios) -> Ratios {
     }
 }
 
-/// Judges a plan: the proof, the samples against it, the path, the file, and the simulated drives.
+/// Judges a plan: the proof, `per_span` samples of every span against it, the path, the file, and, unless the motion
+/// takes longer than `longest_s`, the simulated drives.
 ///
 /// # Errors
 /// The first thing that does not hold.
-pub fn judge(chain: &Chain, machine: &Machine, per_span: usize) -> Result<Figures, Finding> {
+pub fn judge(chain: &Chain, machine: &Machine, per_span: usize, longest_s: f64) -> Result<Figures, Finding> {
     let mut figures = Figures::default();
     let header = FileHeader::from(machine);
     for (k, (section, proof)) in chain.plan.sections().zip(&chain.plan.certificates).enumerate() {
@@ -109,7 +109,7 @@ pub fn judge(chain: &Chain, machine: &Machine, per_span: usize) -> Result<Figure
         Err(mismatch) => return found("contour", format!("{mismatch:?}")),
     };
     file(chain, &header)?;
-    if chain.motion_time_s() > 600.0 {
+    if chain.motion_time_s() > longest_s {
         return Ok(figures);
     }
     let report = match chain.simulate(machine) {

@@ -5,3 +5,4 @@ pub mod deviation;
 pub mod random_table;
 pub mod real;
 pub mod spline;
+pub mod sweep;
