@@ -93,7 +93,10 @@ pub(super) fn inner_axis(peaks: &mut AxisPeaks, p: &Hodograph, r: &Rate, limits:
             (p.third * r.q[i] + 3.0 * cross[i] + r.half_curvature * p.first[i]) * k
         });
         let size = (m3 * mq + 3.0 * m2 * md + mg * m1) * k;
-        peaks.jerk.climb(Form::Squared, &times_quadratic(&square(&f), &r.q), ROUNDING * size * size * mq, at);
+        // Terms far larger than their sum cancel on very short spans: the square is off by 2 f df, not by size df.
+        let (df, most) = (ROUNDING * size, f.iter().fold(0.0, |m: f64, x| m.max(x.abs())));
+        let slack = (ROUNDING * most * most + df * (2.0 * most + df)) * mq;
+        peaks.jerk.climb(Form::Squared, &times_quadratic(&square(&f), &r.q), slack, at);
     }
 }
 
