@@ -58,6 +58,9 @@ impl<const N: usize> Reassembler<N> {
         if found != expected {
             return Err(FrameError::Sequence { expected, found });
         }
+        // Behind the last byte of a block an FD frame may carry padding.
+        let room = if control & LAST != 0 { N - self.block.len() } else { body.len() };
+        let body = body.get(..room).unwrap_or(body);
         self.block.extend_from_slice(body).map_err(|_| FrameError::TooLong)?;
         if control & LAST == 0 {
             self.next = (found < NUMBER).then_some(found + 1);
