@@ -337,16 +337,26 @@ impl<I> Sections<I> {
         Ok(Made::Section(Section { kind, path, marks: Marks { caps, blocks, deviation, end } }))
     }
 
-    /// Four times the rest span that the feeds at both ends ask for; infinite if they ask for none.
+    /// Four times the rest span that the slowest feed beside a change of speed asks for, the rests at both ends among
+    /// them; infinite if none does. A slow feed leaves as little way to change speed in as a rest.
     fn slow_rest(&self, contour: &Contour) -> f64 {
-        let ends = [contour.primitives.first(), contour.primitives.last()];
-        let rest = ends.into_iter().flatten().map(|p| match p.feed {
-            Some(Feed::Speed(speed)) if self.settings.feed_jerk.is_finite() => {
-                4.0 * half_ramp(speed, self.settings.feed_jerk)
+        if !self.settings.feed_jerk.is_finite() {
+            return f64::INFINITY;
+        }
+        let last = contour.primitives.len().saturating_sub(1);
+        let speed = |k: usize| match contour.primitives[k].feed {
+            Some(Feed::Speed(speed)) => speed,
+            Some(Feed::Duration(seconds)) => contour.length_of(k) / seconds,
+            None => f64::INFINITY,
+        };
+        let mut slowest = speed(0).min(speed(last));
+        for k in 1..=last {
+            let (before, here) = (speed(k - 1), speed(k));
+            if before != here {
+                slowest = slowest.min(before).min(here);
             }
-            Some(Feed::Speed(_) | Feed::Duration(_)) | None => f64::INFINITY,
-        });
-        rest.fold(f64::INFINITY, f64::min)
+        }
+        if slowest < f64::INFINITY { 4.0 * half_ramp(slowest, self.settings.feed_jerk) } else { slowest }
     }
 
     /// The nearest drive counts.
