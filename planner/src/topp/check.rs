@@ -161,8 +161,11 @@ pub(super) fn format(layout: &Layout, table: &FeedTable) -> Option<Vec<u32>> {
         if let SpanLaw::Quadratic { h, q: [alpha, beta, gamma] } = law {
             let end = alpha + h * (beta + h * gamma);
             let w = h / (alpha.max(0.0).sqrt() + end.max(0.0).sqrt());
-            if (gamma * w * w).abs() > MOST_CURVED || alpha <= 0.0 || end <= 0.0 {
-                *part = (*part).max(2);
+            let curved = (gamma * w * w).abs();
+            if curved > MOST_CURVED || alpha <= 0.0 || end <= 0.0 {
+                // At the same q, the argument falls with the square of the length.
+                let parts = (1.2 * (curved / MOST_CURVED).sqrt()).ceil().clamp(2.0, 8.0);
+                *part = (*part).max(parts as u32);
                 sound = false;
             }
         }

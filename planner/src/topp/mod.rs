@@ -29,7 +29,7 @@ use rows::RowSource;
 use sweep::Sweep;
 
 /// Rounds of dividing spans that the format does not allow.
-const MOST_REFINEMENTS: usize = 6;
+const MOST_REFINEMENTS: usize = 12;
 /// Rounds of making the codes finer at the expense of top speed.
 const MOST_RESCALES: usize = 6;
 /// Headroom of the codes above the swept q.
