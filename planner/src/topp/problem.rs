@@ -28,13 +28,55 @@ pub struct Settings {
     pub relative_gap: f64,
     /// q spans per A/J of motion time.
     pub spans_per_ramp: f64,
+    /// How jerk is written.
+    pub jerk: JerkForm,
+    /// How rows stand for whole spans.
+    pub rows: RowForm,
+    /// How long paths are divided.
+    pub windows: Windows,
 }
 
 impl Default for Settings {
     /// Interior point, a gap of 1e-5 of the time, four spans per ramp: about 0.1 % above a very fine plan.
     fn default() -> Self {
-        Settings { solver: Solver::InteriorPoint, relative_gap: 1e-5, spans_per_ramp: 4.0 }
+        Settings {
+            solver: Solver::InteriorPoint,
+            relative_gap: 1e-5,
+            spans_per_ramp: 4.0,
+            jerk: JerkForm::True,
+            rows: RowForm::Bernstein,
+            windows: Windows::Overlap,
+        }
     }
+}
+
+/// How the jerk limit enters the problem.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JerkForm {
+    /// As it is, by tangents that move with the solution.
+    True,
+    /// |f| <= J/sqrt(q*), q* swept without jerk [Zhao2016 eq. 3.4]: linear, and stricter.
+    Pseudo,
+}
+
+/// Where a limit is asked to hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RowForm {
+    /// Everywhere: rows are Bernstein coefficients.
+    Bernstein,
+    /// In the middle of each span only, as the literature has it. Such plans fail their certificate.
+    Collocation,
+}
+
+/// How long paths are divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Windows {
+    /// Not at all.
+    Whole,
+    /// Side by side, then once more round their joints.
+    Overlap,
+    /// Spliced where the motion is slow, then relaxed and refined [Zhao2016 3.2].
+    Zhao,
 }
 
 /// The solvers behind the one problem type.

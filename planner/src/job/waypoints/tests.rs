@@ -317,7 +317,7 @@ fn a_tooth_raster_is_one_section() {
 fn sections_can_be_planned_and_certified() {
     let machine = machine();
     let limits: Vec<_> = machine.axes.iter().map(|a| a.limits).collect();
-    let settings = Settings { solver: Solver::InteriorPoint, relative_gap: 1e-3, spans_per_ramp: 2.0 };
+    let settings = Settings { relative_gap: 1e-3, spans_per_ramp: 2.0, ..Settings::default() };
     let cat = WayPoints::from_rows(cat_contour(60).unwrap(), [0, 1], "cat", &machine).unwrap();
     let tooth = WayPoints::from_rows(tooth_raster(4, 25), [0, 1, 2], "tooth", &machine).unwrap();
     let back = read_from(&b"X,Y\n0,0\n30,40\n0,0\n30,40\n"[..], "there and back", &machine).unwrap();
