@@ -6,7 +6,7 @@ use crate::geometry::section::SpeedCap;
 use crate::job::program::StopCause;
 use crate::job::samples::{cat_contour, tooth_raster};
 use crate::topp;
-use crate::topp::problem::{Problem, Settings, Solver};
+use crate::topp::problem::{Problem, Settings};
 use miette::Diagnostic;
 use proptest::prelude::*;
 
