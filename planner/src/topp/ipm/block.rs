@@ -95,20 +95,19 @@ impl Tangent {
     /// Both slacks of a block with the jerks f.c.
     #[inline(always)]
     fn slacks(&self, k: usize, room: Lanes, f: Lanes) -> [Lanes; 2] {
-        let base = Lanes::splat(self.base[k]) + room * self.alpha;
-        let force = f * self.alpha;
-        [base - force, base + force]
+        let base = Lanes::splat(self.base[k]).plus(room, Lanes::splat(self.alpha));
+        [base.plus(f, Lanes::splat(-self.alpha)), base.plus(f, Lanes::splat(self.alpha))]
     }
 
     /// Both rows of a block.
     #[inline(always)]
     fn rows(&self, k: usize, f: &[Lanes; 3]) -> [[Lanes; 3]; 2] {
-        let force = scaled(f, Lanes::splat(self.alpha));
+        let (up, down) = (Lanes::splat(self.alpha), Lanes::splat(-self.alpha));
         let x = &self.x[k];
         let (x0, x1, x2) = (Lanes::splat(x[0]), Lanes::splat(x[1]), Lanes::splat(x[2]));
         [
-            [x0 + force[0], x1 + force[1], x2 + force[2]],
-            [x0 - force[0], x1 - force[1], x2 - force[2]],
+            [x0.plus(f[0], up), x1.plus(f[1], up), x2.plus(f[2], up)],
+            [x0.plus(f[0], down), x1.plus(f[1], down), x2.plus(f[2], down)],
         ]
     }
 }
@@ -408,29 +407,29 @@ impl Rows {
             let c = cell.controls(c);
             let mut sum = Sums::default();
             for u in uppers {
-                u.z += u.dz * step;
+                u.z = u.z.plus(u.dz, step);
                 let slack = u.room - product(&u.a, &c);
                 let inverse = Lanes::splat(1.0) / slack;
                 sum.matrix(&u.a, u.z * inverse);
                 grow(&mut sum.g, &u.a, inverse);
-                gap += u.z * slack;
+                gap = gap.plus(u.z, slack);
             }
             for p in bends {
-                p.z[0] += p.dz[0] * step;
-                p.z[1] += p.dz[1] * step;
+                p.z[0] = p.z[0].plus(p.dz[0], step);
+                p.z[1] = p.z[1].plus(p.dz[1], step);
                 let f = product(&p.f, &c);
                 let slack = [p.room - f, p.room + f];
                 let inverse = inverses(&slack);
                 sum.matrix(&p.f, p.z[0] * inverse[0] + p.z[1] * inverse[1]);
                 grow(&mut sum.g, &p.f, inverse[0] - inverse[1]);
-                gap += p.z[0] * slack[0] + p.z[1] * slack[1];
+                gap = gap.plus(p.z[0], slack[0]).plus(p.z[1], slack[1]);
             }
             if !jerks.is_empty() {
                 cell.move_tangent(jerks, &c);
                 let t = cell.tangent(cell.s, &c);
                 for (b, p) in jerks.iter_mut().enumerate() {
-                    p.z[0] += p.dz[0] * step;
-                    p.z[1] += p.dz[1] * step;
+                    p.z[0] = p.z[0].plus(p.dz[0], step);
+                    p.z[1] = p.z[1].plus(p.dz[1], step);
                     let k = cell.coefficient(b);
                     let slack = t.slacks(k, p.room, product(&p.f, &c));
                     let [up, down] = t.rows(k, &p.f);
@@ -439,7 +438,7 @@ impl Rows {
                     sum.matrix(&down, p.z[1] * inverse[1]);
                     grow(&mut sum.g, &up, inverse[0]);
                     grow(&mut sum.g, &down, inverse[1]);
-                    gap += p.z[0] * slack[0] + p.z[1] * slack[1];
+                    gap = gap.plus(p.z[0], slack[0]).plus(p.z[1], slack[1]);
                 }
             }
             let at = cell.at as usize;
@@ -532,9 +531,9 @@ impl Rows {
 /// sum += w a.
 #[inline(always)]
 fn grow(sum: &mut [Lanes; 3], a: &[Lanes; 3], w: Lanes) {
-    sum[0] += a[0] * w;
-    sum[1] += a[1] * w;
-    sum[2] += a[2] * w;
+    sum[0] = sum[0].plus(a[0], w);
+    sum[1] = sum[1].plus(a[1], w);
+    sum[2] = sum[2].plus(a[2], w);
 }
 
 /// Adds sums over lanes to three neighbours from `at` on.
@@ -562,7 +561,7 @@ impl Combined {
         let r = dc * inverse;
         let correction = z * da * (Lanes::splat(1.0) - da * inverse);
         self.rise = self.rise.max(r);
-        (self.mu - correction) * inverse - z + z * r
+        ((self.mu - correction) * inverse - z).plus(z, r)
     }
 
     /// Takes in both -dz/z by one division.
@@ -585,12 +584,12 @@ impl Sums {
     #[inline(always)]
     fn matrix(&mut self, a: &[Lanes; 3], w: Lanes) {
         let b = scaled(a, w);
-        self.m[0] += b[0] * a[0];
-        self.m[1] += b[0] * a[1];
-        self.m[2] += b[0] * a[2];
-        self.m[3] += b[1] * a[1];
-        self.m[4] += b[1] * a[2];
-        self.m[5] += b[2] * a[2];
+        self.m[0] = self.m[0].plus(b[0], a[0]);
+        self.m[1] = self.m[1].plus(b[0], a[1]);
+        self.m[2] = self.m[2].plus(b[0], a[2]);
+        self.m[3] = self.m[3].plus(b[1], a[1]);
+        self.m[4] = self.m[4].plus(b[1], a[2]);
+        self.m[5] = self.m[5].plus(b[2], a[2]);
     }
 }
 
@@ -608,7 +607,7 @@ impl AffineSums {
     fn row(&mut self, d: Lanes, z: Lanes, inverse: Lanes) -> Lanes {
         let (r, t) = (d * inverse, z * d);
         self.s1 += t;
-        self.s2 += t * r;
+        self.s2 = self.s2.plus(t, r);
         self.rise = self.rise.max(r);
         self.fall = self.fall.min(r);
         t * (Lanes::splat(1.0) - r)
