@@ -91,13 +91,13 @@ impl Lanes {
 }
 
 macro_rules! lane_by_lane {
-    ($($name:ident, $method:ident, $op:tt;)*) => {$(
+    ($($name:ident, $method:ident, $assign:tt;)*) => {$(
         impl $name for Lanes {
             type Output = Lanes;
             #[inline(always)]
             fn $method(mut self, other: Lanes) -> Lanes {
                 for l in 0..LANES {
-                    self.0[l] = self.0[l] $op other.0[l];
+                    self.0[l] $assign other.0[l];
                 }
                 self
             }
@@ -106,10 +106,10 @@ macro_rules! lane_by_lane {
 }
 
 lane_by_lane! {
-    Add, add, +;
-    Sub, sub, -;
-    Mul, mul, *;
-    Div, div, /;
+    Add, add, +=;
+    Sub, sub, -=;
+    Mul, mul, *=;
+    Div, div, /=;
 }
 
 impl Mul<f64> for Lanes {

@@ -8,7 +8,7 @@ use super::ipm::{Run, SCALINGS, START_SLACK, Stretch, Workspace};
 use super::rows::RowSource;
 
 /// Spans per window.
-const WINDOW: usize = 2000;
+const WINDOW: usize = 4000;
 /// Spans re-solved on either side of a joint.
 const REACH: usize = 250;
 /// What the first stage leaves below every limit round a joint, so that the second starts well inside. Of the time it

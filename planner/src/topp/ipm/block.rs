@@ -1,8 +1,8 @@
 //! Rows of the cells, lanes side by side, and the passes over them.
 
 use super::super::lanes::{LANES, Lanes, product, scaled, totals};
-use super::band::Band;
 use super::super::rows::{CellRows, Row, dot};
+use super::band::Band;
 
 /// Share of a limit that rounding always leaves to the solver.
 const LEAST_ROOM: f64 = 0.05;

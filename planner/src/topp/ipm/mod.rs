@@ -148,9 +148,7 @@ impl Workspace {
             let a = &span.a;
             let b = scaled(a, bend);
             let g = totals(&scaled(a, slope));
-            for j in 0..3 {
-                self.gradient[i + j] -= 0.5 * g[j];
-            }
+            self.gradient[i..i + 3].iter_mut().zip(g).for_each(|(sum, g)| *sum -= 0.5 * g);
             let m = [
                 (b[0] * a[0]).total(),
                 (b[0] * a[1]).total(),
@@ -274,9 +272,9 @@ impl<M: Fn(usize) -> f64> WithSimd for Load<'_, '_, '_, M> {
         let mut builder = RowBuilder::new(source);
         for (at, s) in (*first..self.end).enumerate() {
             let mut half = [0.0; 3];
-            for j in 0..3 {
-                if (1..=m).contains(&(s + j)) {
-                    half[j] = self.half[s + j - 1];
+            for (j, half) in (s..).zip(&mut half) {
+                if (1..=m).contains(&j) {
+                    *half = self.half[j - 1];
                 }
             }
             let margin = (self.margin)(s);
