@@ -304,7 +304,8 @@ fn rest_lengths(problem: &Problem, sweep: &Sweep, ramp_s: f64) -> ([f64; 2], [f6
             // Acceleration saturates exactly at the joint: A^3/(6 J^2 |p'|) = A T^2/(6 |p'|) with T = A/J; where
             // jerk hardly matters, T is two ticks or a small share of the ramp.
             let t = (l.acceleration / l.jerk).max(0.05 * ramp_s).max(2.0 * problem.control_tick_s);
-            length = length.min(l.acceleration * t * t / (6.0 * slope));
+            let first = t.min(LONGEST_S);
+            length = length.min(l.acceleration / t * first.powi(3) / (6.0 * slope));
             jerk = jerk.min(l.jerk / slope);
         }
         let q = sweep.constant[if far { sweep.constant.len() - 1 } else { 0 }];
