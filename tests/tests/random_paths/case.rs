@@ -3,9 +3,14 @@
 use planner::geometry::grid_path::GridPath;
 use planner::geometry::section::{FeedCap, SpeedCap};
 use planner::job::machine::AxisLimits;
+use tests::oracle::sweep::swept_time;
 
 use crate::chance::Chance;
 use crate::paths::{Shape, path, shape};
+
+/// Longest motion [s], and the most times that the quickest axis could build up its acceleration.
+const LONGEST_S: f64 = 1000.0;
+const MOST_RAMPS: f64 = 1000.0;
 
 /// One problem of the planner.
 #[derive(Clone, Debug)]
@@ -29,6 +34,13 @@ impl Case {
         loop {
             let limits = limits(chance, axes, path.length());
             let caps = caps(chance, &path, &limits);
+            // Long motions are many short ones: ten thousand cases are to be a matter of minutes.
+            let seconds = swept_time(&path, &limits, &caps, 4);
+            let ramps = limits.iter().filter(|l| l.jerk.is_finite()).map(|l| l.acceleration / l.jerk);
+            let ramp_s = ramps.fold(seconds, f64::min);
+            if seconds > LONGEST_S || seconds > MOST_RAMPS * ramp_s.max(tick_s) {
+                continue;
+            }
             if let Some(finer) = finer(&path, &limits, &caps) {
                 path.breaks.iter_mut().for_each(|b| *b <<= finer);
                 path.step *= (-f64::from(finer)).exp2();
@@ -59,12 +71,16 @@ fn finer(path: &GridPath, limits: &[AxisLimits], caps: &[FeedCap]) -> Option<u32
 
 /// Velocities over six decades, times to reach them and full acceleration over three decades each; alike for all
 /// axes, within a decade, or each for itself.
+///
+/// An axis reaches its speed within a minute and its acceleration within seconds: a table span lasts less than a
+/// second, and speeds in one table lie within six decades.
 fn limits(chance: &mut Chance, axes: usize, length: f64) -> Vec<AxisLimits> {
     let free = chance.one_in(10);
     let any = |chance: &mut Chance, speed: f64| {
-        let to_speed_s = length / speed * chance.decades(-1.5, 1.5);
+        let to_speed_s = (length / speed * chance.decades(-1.5, 1.5)).min(60.0);
         let acceleration = speed / to_speed_s;
         let to_acceleration_s = to_speed_s.min((length / acceleration).sqrt()) * chance.decades(-2.0, 1.0);
+        let to_acceleration_s = to_acceleration_s.min(5.0);
         let jerk = if free { f64::INFINITY } else { acceleration / to_acceleration_s };
         AxisLimits { velocity: speed, acceleration, jerk }
     };

@@ -56,6 +56,10 @@ fn check(case: &Case) -> Result<(), Finding> {
     let Case { path, limits, caps, tick_s, .. } = case;
     let problem = Problem { path, limits, caps, control_tick_s: *tick_s };
     let begin = Instant::now();
+    if std::env::var("SHOW").is_ok() {
+        println!("SHOW {} {} {} {:?} {:?} tick {tick_s} sweep {}", path.spans(), path.step, path.length(), limits, caps, swept_time(path, limits, caps, 64));
+        for a in &path.axes { println!("AXIS {:?}", a.controls.iter().take(12).map(|&c| c as f64 * a.lsb).collect::<Vec<_>>()); }
+    }
     let plan = match plan(&problem, &Settings::default()) {
         Ok(plan) => plan,
         Err(e) => return found(kind(&e), e.to_string()),
