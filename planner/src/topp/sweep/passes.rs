@@ -3,10 +3,9 @@
 //! The limits of one axis are a strip |s q + g w| <= 1 in q and the path acceleration w, with g = |p'|/A and
 //! s = sign(p') p''/A. From one station to the next q rises by d w, d twice their distance, so each strip bounds q
 //! at one station by a line in q at the other. Lines are computed for several stations at once; only the minima over
-//! them wait for each other. They are written as plain sums and products, which vectorise and give the same bits on
-//! every machine.
+//! them wait for each other. Nothing is contracted to fused products, so that the bits are the same on every machine.
 
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::samples::{LANES, Lanes, Samples};
 use crate::job::machine::{AxisLimits, MAX_AXES};
@@ -91,15 +90,15 @@ impl Sweeper {
             acceleration: std::array::from_fn(|a| 1.0 / limits[a].acceleration),
         };
         let arch = Arch::new();
-        arch.dispatch(|| strips.bound(&samples.cap, &mut self.bounds));
+        arch.dispatch(Pass::Bound(&strips, &samples.cap, &mut self.bounds));
         self.q.copy_from_slice(&self.bounds);
         let q = self.q.as_flattened_mut();
         let last = samples.stations.len() - 1;
         q[0] = 0.0;
         q[last..].fill(0.0);
         replace_infinities(q);
-        arch.dispatch(|| strips.backward(&samples.steps, &mut self.q));
-        arch.dispatch(|| strips.forward(&samples.steps, &mut self.q));
+        arch.dispatch(Pass::Backward(&strips, &samples.steps, &mut self.q));
+        arch.dispatch(Pass::Forward(&strips, &samples.steps, &mut self.q));
     }
 }
 
@@ -117,6 +116,26 @@ struct Strips<'a, const A: usize> {
     acceleration: [f64; A],
 }
 
+/// A pass with its input and output, compiled for each instruction set.
+enum Pass<'a, const A: usize> {
+    Bound(&'a Strips<'a, A>, &'a [Lanes], &'a mut [Lanes]),
+    Backward(&'a Strips<'a, A>, &'a [Lanes], &'a mut [Lanes]),
+    Forward(&'a Strips<'a, A>, &'a [Lanes], &'a mut [Lanes]),
+}
+
+impl<const A: usize> WithSimd for Pass<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        match self {
+            Pass::Bound(strips, caps, bounds) => strips.bound(simd, caps, bounds),
+            Pass::Backward(strips, steps, q) => strips.backward(simd, steps, q),
+            Pass::Forward(strips, steps, q) => strips.forward(simd, steps, q),
+        }
+    }
+}
+
 /// One line per axis and station: q here <= slope q + offset of a neighbour.
 struct Lines<const A: usize> {
     slope: [Lanes; A],
@@ -124,39 +143,34 @@ struct Lines<const A: usize> {
 }
 
 impl<const A: usize> Strips<'_, A> {
-    /// g and s of axis `a` at the stations of `chunk`.
+    /// g and s of axis `a` at part `v` of the stations of `chunk`.
     #[inline(always)]
-    fn strip(&self, chunk: usize, a: usize) -> (Lanes, Lanes) {
-        let (first, second) = (&self.first[chunk][a], &self.second[chunk][a]);
-        let scale = self.acceleration[a];
-        let (mut gain, mut slope) = ([0.0; LANES], [0.0; LANES]);
-        for l in 0..LANES {
-            gain[l] = first[l].abs() * scale;
-            slope[l] = if first[l] < 0.0 { -second[l] } else { second[l] } * scale;
-        }
-        (gain, slope)
+    fn strip<S: Simd>(&self, simd: S, chunk: usize, v: usize, a: usize) -> (S::f64s, S::f64s) {
+        let (first, second) = (part::<S>(&self.first[chunk][a], v), part::<S>(&self.second[chunk][a], v));
+        let scale = simd.splat_f64s(self.acceleration[a]);
+        let sign = simd.and_f64s(first, simd.splat_f64s(-0.0));
+        let slope = simd.mul_f64s(simd.xor_f64s(second, sign), scale);
+        (simd.mul_f64s(simd.abs_f64s(first), scale), slope)
     }
 
     /// Largest q at each station by itself: caps, velocity, and a common w within every strip.
     #[inline(always)]
-    fn bound(&self, cap: &[Lanes], bounds: &mut [Lanes]) {
-        for (chunk, (cap, bound)) in cap.iter().zip(bounds).enumerate() {
-            let (mut speed, mut bend) = ([0.0; LANES], [0.0; LANES]);
-            for a in 0..A {
-                let (first, second) = (&self.first[chunk][a], &self.second[chunk][a]);
-                for l in 0..LANES {
-                    speed[l] = larger(first[l].abs() * self.velocity[a], speed[l]);
-                    bend[l] = larger(second[l].abs() * self.acceleration[a], bend[l]);
+    fn bound<S: Simd>(&self, simd: S, caps: &[Lanes], bounds: &mut [Lanes]) {
+        let (one, zero) = (simd.splat_f64s(1.0), simd.splat_f64s(0.0));
+        for (chunk, (cap, bounds)) in caps.iter().zip(bounds).enumerate() {
+            for (v, bound) in S::as_mut_simd_f64s(bounds).0.iter_mut().enumerate() {
+                let (mut speed, mut bend) = (zero, zero);
+                for a in 0..A {
+                    let first = simd.abs_f64s(part::<S>(&self.first[chunk][a], v));
+                    let second = simd.abs_f64s(part::<S>(&self.second[chunk][a], v));
+                    speed = simd.max_f64s(simd.mul_f64s(first, simd.splat_f64s(self.velocity[a])), speed);
+                    bend = simd.max_f64s(simd.mul_f64s(second, simd.splat_f64s(self.acceleration[a])), bend);
                 }
-            }
-            let mut beyond = 0.0;
-            for l in 0..LANES {
-                bound[l] = smaller(cap[l], 1.0 / (speed[l] * speed[l]));
-                beyond = larger(bound[l] * bend[l], beyond);
-            }
-            // Up to q |s| = 1 a steady speed is within every strip.
-            if beyond > 1.0 {
-                self.meet(chunk, &speed, bound);
+                let alone = simd.div_f64s(one, simd.mul_f64s(speed, speed));
+                let q = simd.min_f64s(part::<S>(cap, v), alone);
+                // Up to q |s| = 1 a steady speed is within every strip.
+                let steep = simd.less_than_f64s(one, simd.mul_f64s(q, bend));
+                *bound = if any(simd, steep) { self.meet(simd, chunk, v, q, bend) } else { q };
             }
         }
     }
@@ -164,49 +178,39 @@ impl<const A: usize> Strips<'_, A> {
     /// Lowers q to where all strips have a w in common, the maximum velocity curve: the strips of axes a and b part
     /// at (g_a + g_b)/|s_a g_b - s_b g_a|. The least of these fractions is found by products.
     #[inline(always)]
-    fn meet(&self, chunk: usize, speed: &Lanes, bound: &mut Lanes) {
-        let (mut gain, mut slope) = ([[0.0; LANES]; A], [[0.0; LANES]; A]);
+    fn meet<S: Simd>(&self, simd: S, chunk: usize, v: usize, q: S::f64s, bend: S::f64s) -> S::f64s {
+        let (one, zero) = (simd.splat_f64s(1.0), simd.splat_f64s(0.0));
+        let (mut gain, mut slope) = ([zero; A], [zero; A]);
         for a in 0..A {
-            (gain[a], slope[a]) = self.strip(chunk, a);
+            (gain[a], slope[a]) = self.strip(simd, chunk, v, a);
         }
-        let (mut over, mut under) = (*bound, [1.0; LANES]);
+        let (mut over, mut under, mut moving) = (q, one, zero);
         for a in 0..A {
+            moving = simd.max_f64s(moving, gain[a]);
             for b in a + 1..A {
-                for l in 0..LANES {
-                    let room = gain[a][l] + gain[b][l];
-                    let turn = (slope[a][l] * gain[b][l] - slope[b][l] * gain[a][l]).abs();
-                    let less = room * under[l] < over[l] * turn;
-                    over[l] = if less { room } else { over[l] };
-                    under[l] = if less { turn } else { under[l] };
-                }
+                let room = simd.add_f64s(gain[a], gain[b]);
+                let turn = simd.sub_f64s(simd.mul_f64s(slope[a], gain[b]), simd.mul_f64s(slope[b], gain[a]));
+                let turn = simd.abs_f64s(turn);
+                let less = simd.less_than_f64s(simd.mul_f64s(room, under), simd.mul_f64s(over, turn));
+                over = simd.select_f64s(less, room, over);
+                under = simd.select_f64s(less, turn, under);
             }
         }
-        for l in 0..LANES {
-            bound[l] = over[l] / under[l];
-            if speed[l] == 0.0 {
-                // Nothing moves but bends: |s| q <= 1 for every axis.
-                bound[l] = slope.iter().fold(bound[l], |q, slope| smaller(1.0 / slope[l].abs(), q));
-            }
-        }
+        // Where nothing moves but bends, |s| q <= 1 for every axis.
+        let still = simd.equal_f64s(moving, zero);
+        let bent = simd.and_m64s(still, simd.less_than_f64s(one, simd.mul_f64s(q, bend)));
+        over = simd.select_f64s(bent, one, over);
+        under = simd.select_f64s(bent, bend, under);
+        simd.div_f64s(over, under)
     }
 
     /// Lowers q to what the rest of the path can be survived from: the lowest w still has to reach q at the next
     /// station, q + d w <= q_next, at w = (-1 - s q)/g.
     #[inline(always)]
-    fn backward(&self, steps: &[Lanes], q: &mut [Lanes]) {
+    fn backward<S: Simd>(&self, simd: S, steps: &[Lanes], q: &mut [Lanes]) {
         let mut next = 0.0;
         for (chunk, (step, q)) in steps.iter().zip(q).enumerate().rev() {
-            let mut lines = Lines { slope: [[0.0; LANES]; A], offset: [[0.0; LANES]; A] };
-            for a in 0..A {
-                let (gain, slope) = self.strip(chunk, a);
-                for l in 0..LANES {
-                    let cost = gain[l] - step[l] * slope[l];
-                    let bounds = cost > STILL;
-                    let inverse = 1.0 / cost;
-                    lines.slope[a][l] = if bounds { gain[l] * inverse } else { 0.0 };
-                    lines.offset[a][l] = if bounds { step[l] * inverse } else { f64::INFINITY };
-                }
-            }
+            let lines = self.lines(simd, chunk, step, |gain, cost| (gain, cost));
             for l in (0..LANES).rev() {
                 // The last station has no next one: q is zero there and stays so.
                 next = smaller(lines.least(l, next), q[l]);
@@ -217,25 +221,57 @@ impl<const A: usize> Strips<'_, A> {
 
     /// Lowers q to what can be reached: q_next <= q + d w at the highest w = (1 - s q)/g.
     #[inline(always)]
-    fn forward(&self, steps: &[Lanes], q: &mut [Lanes]) {
+    fn forward<S: Simd>(&self, simd: S, steps: &[Lanes], q: &mut [Lanes]) {
         let mut reach = 0.0;
         for (chunk, (step, q)) in steps.iter().zip(q).enumerate() {
-            let mut lines = Lines { slope: [[0.0; LANES]; A], offset: [[0.0; LANES]; A] };
-            for a in 0..A {
-                let (gain, slope) = self.strip(chunk, a);
-                for l in 0..LANES {
-                    let moves = gain[l] > STILL;
-                    let inverse = 1.0 / gain[l];
-                    lines.slope[a][l] = if moves { (gain[l] - step[l] * slope[l]) * inverse } else { 0.0 };
-                    lines.offset[a][l] = if moves { step[l] * inverse } else { f64::INFINITY };
-                }
-            }
+            let lines = self.lines(simd, chunk, step, |gain, cost| (cost, gain));
             for (l, q) in q.iter_mut().enumerate() {
                 *q = smaller(reach, *q);
                 reach = larger(lines.least(l, *q), 0.0);
             }
         }
     }
+
+    /// Lines of slope over/under and offset d/under, where over and under are g and g - d s in some order; none
+    /// where under is not positive.
+    #[inline(always)]
+    fn lines<S: Simd>(
+        &self,
+        simd: S,
+        chunk: usize,
+        step: &Lanes,
+        order: impl Fn(S::f64s, S::f64s) -> (S::f64s, S::f64s),
+    ) -> Lines<A> {
+        let (one, zero) = (simd.splat_f64s(1.0), simd.splat_f64s(0.0));
+        let (still, far) = (simd.splat_f64s(STILL), simd.splat_f64s(f64::INFINITY));
+        let mut lines = Lines { slope: [[0.0; LANES]; A], offset: [[0.0; LANES]; A] };
+        for a in 0..A {
+            let slopes = S::as_mut_simd_f64s(&mut lines.slope[a]).0;
+            let offsets = S::as_mut_simd_f64s(&mut lines.offset[a]).0;
+            for (v, (line, offset)) in slopes.iter_mut().zip(offsets).enumerate() {
+                let (gain, slope) = self.strip(simd, chunk, v, a);
+                let step = part::<S>(step, v);
+                let (over, under) = order(gain, simd.sub_f64s(gain, simd.mul_f64s(step, slope)));
+                let bounds = simd.less_than_f64s(still, under);
+                let inverse = simd.div_f64s(one, under);
+                *line = simd.select_f64s(bounds, simd.mul_f64s(over, inverse), zero);
+                *offset = simd.select_f64s(bounds, simd.mul_f64s(step, inverse), far);
+            }
+        }
+        lines
+    }
+}
+
+/// Part `v` of the lanes, as many as the instruction set takes at once.
+#[inline(always)]
+fn part<S: Simd>(lanes: &Lanes, v: usize) -> S::f64s {
+    S::as_simd_f64s(lanes).0[v]
+}
+
+/// Whether any lane is set.
+#[inline(always)]
+fn any<S: Simd>(simd: S, mask: S::m64s) -> bool {
+    simd.first_true_m64s(mask) < S::F64_LANES
 }
 
 impl<const A: usize> Lines<A> {
