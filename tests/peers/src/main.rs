@@ -84,21 +84,43 @@ fn sweeps(table: &mut Table, python: Option<PathBuf>) -> Result<(), String> {
             rival.compute = rival.compute.min(again.compute);
         }
         table.push(Row::peer(&item, "copp TOPP2-RA, compute only", rival.compute, rival.time, ours));
-        table.push(Row::peer(&item, "copp TOPP2-RA, set-up included", rival.setup + rival.compute, rival.time, ours));
+        table.push(Row::peer(
+            &item,
+            "copp TOPP2-RA, set-up included",
+            rival.setup + rival.compute,
+            rival.time,
+            ours,
+        ));
         let Some(python) = &python else {
             eprintln!("peers: SKIPPED toppra: no python with it was named");
             continue;
         };
         let peer = python::toppra(python, &sampled, &limits[0], FEW)?;
-        table.push(Row::peer(&item, &format!("{}, seidel, compute only", peer.name), peer.compute, peer.time, ours));
-        table.push(Row::peer(&item, &format!("{}, set-up included", peer.name), peer.setup + peer.compute, peer.time, ours));
+        table.push(Row::peer(
+            &item,
+            &format!("{}, seidel, compute only", peer.name),
+            peer.compute,
+            peer.time,
+            ours,
+        ));
+        table.push(Row::peer(
+            &item,
+            &format!("{}, set-up included", peer.name),
+            peer.setup + peer.compute,
+            peer.time,
+            ours,
+        ));
     }
     Ok(())
 }
 
 /// Time of q linear between stations [s].
 fn traverse(stations: &[f64], q: &[f64]) -> f64 {
-    stations.windows(2).zip(q.windows(2)).map(|(u, q)| 2.0 * (u[1] - u[0]) / (q[0].sqrt() + q[1].sqrt())).sum()
+    stations
+        .windows(2)
+        .zip(q.windows(2))
+        .map(|(u, q)| 2.0 * (u[1] - u[0]) / (q[0].sqrt() + q[1].sqrt()))
+        .sum()
 }
 
 /// Minimum time under jerk limits.

@@ -27,7 +27,8 @@ pub fn toppra(python: &Path, path: &Sampled, limits: &AxisLimits, repeats: usize
     let bytes: Vec<u8> = path.derivatives[1..=2].iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
     fs::write(&data, bytes).map_err(|e| format!("{}: {e}", data.display()))?;
     let length = path.stations[path.stations.len() - 1];
-    let numbers = [path.stations.len() as f64, path.axes as f64, length, limits.velocity, limits.acceleration];
+    let numbers =
+        [path.stations.len() as f64, path.axes as f64, length, limits.velocity, limits.acceleration];
     let output = Command::new(python)
         .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/toppra_peer.py"))
         .arg(&data)

@@ -96,7 +96,8 @@ pub fn third_order(path: &Sampled, limits: &[AxisLimits], choice: Choice) -> Res
     let start = reach(&robot, path.stations.len())?;
     robot.constraints.amax_substitute(&start, 0)?;
     let mut at: Option<Topp3Profile> = None;
-    let mut best = Third { first: 0.0, first_time: 0.0, converged: 0.0, settled: false, steps: 0, time: f64::INFINITY };
+    let mut best =
+        Third { first: 0.0, first_time: 0.0, converged: 0.0, settled: false, steps: 0, time: f64::INFINITY };
     let mut last = f64::INFINITY;
     while best.steps <= MOST_STEPS && !best.settled {
         let profile = match step(&mut robot, &start, at.as_ref(), choice, &options) {
@@ -162,7 +163,13 @@ fn robot(path: &Sampled, limits: &[AxisLimits], jerk: bool) -> Result<Robot<usiz
     let pair = |[most, least]: &'_ [Vec<f64>; 2]| (most.clone(), least.clone());
     let mut robot = Robot::with_capacity(path.axes, n);
     robot.with_s(path.stations.as_slice())?;
-    robot.with_q(&q.as_view(), &first.as_view(), &second.as_view(), third.map(|m| m.as_view()).as_ref(), 0)?;
+    robot.with_q(
+        &q.as_view(),
+        &first.as_view(),
+        &second.as_view(),
+        third.map(|m| m.as_view()).as_ref(),
+        0,
+    )?;
     let (most, least) = pair(&velocity);
     robot.with_axial_velocity((most.as_slice(), n), (least.as_slice(), n), 0)?;
     let (most, least) = pair(&acceleration);

@@ -38,7 +38,8 @@ impl Table {
 
     /// A Markdown table.
     pub fn text(&self) -> String {
-        let mut text = String::from("| item | planner | ms | ratio | traverse time s |\n|---|---|--:|--:|--:|\n");
+        let mut text =
+            String::from("| item | planner | ms | ratio | traverse time s |\n|---|---|--:|--:|--:|\n");
         for row in &self.rows {
             text += &line(row);
             text.push('\n');
