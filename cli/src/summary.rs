@@ -1,24 +1,25 @@
 //! What a verb prints for people: one aligned column of names, one of values.
 
-use crate::json::{BusJson, CertificateJson, InspectJson, PlanJson, VerifyJson};
+use crate::json::{BusJson, CertificateJson, InspectJson, PlanJson, SampleJson, VerifyJson};
 use crate::report::words::{bytes, count, duration, length, percent, times};
 
 /// The summary of `plan` and `run`.
 pub fn plan(p: &PlanJson) -> String {
     let mut s = Sheet::new(&format!("{} on {}", p.job, p.machine));
-    let mut kinds = vec![format!("{} lines", count(p.lines)), format!("{} arcs", count(p.arcs))];
-    if p.splines > 0 {
-        kinds.push(format!("{} splines", count(p.splines)));
+    if let Some(points) = &p.way_points {
+        let (ends, knots) = (&points.ends, &points.knots);
+        s.row("way-points", &format!("{}, {ends} spline, {knots} knots", count(points.count)));
+    } else {
+        s.row("program", &blocks(p));
     }
-    kinds.push(format!("{} rapids", count(p.rapids)));
-    s.row("program", &format!("{} blocks: {}", count(p.blocks), kinds.join(", ")));
     s.row("length", &format!("{} feed, {} rapid", length(p.feed_length_mm), length(p.rapid_length_mm)));
     s.row("stops", &format!("{}, {} dwells", count(p.stops), count(p.dwells)));
     s.row("cycle time", &format!("{} ({} in motion)", duration(p.cycle_time_s), duration(p.motion_time_s)));
     s.row("at constant feed", &duration(p.constant_feed_time_s));
     if let Some(stop) = p.stop_every_block_time_s {
         let gain = if p.motion_time_s > 0.0 { stop / p.motion_time_s } else { 1.0 };
-        s.row("stop at each block", &format!("{} ({} as long)", duration(stop), times(gain)));
+        let name = if p.way_points.is_some() { "stop at each point" } else { "stop at each block" };
+        s.row(name, &format!("{} ({} as long)", duration(stop), times(gain)));
     }
     let (bound, allowed) = (p.max_deviation_mm, p.tolerance_mm);
     s.row("deviation", &format!("{bound:.4} mm of {allowed} mm allowed ({})", p.tolerance_source));
@@ -50,6 +51,23 @@ pub fn plan(p: &PlanJson) -> String {
     if let Some(report) = &p.files.report {
         s.row("report", report);
     }
+    s.text
+}
+
+fn blocks(p: &PlanJson) -> String {
+    let mut kinds = vec![format!("{} lines", count(p.lines)), format!("{} arcs", count(p.arcs))];
+    if p.splines > 0 {
+        kinds.push(format!("{} splines", count(p.splines)));
+    }
+    kinds.push(format!("{} rapids", count(p.rapids)));
+    format!("{} blocks: {}", count(p.blocks), kinds.join(", "))
+}
+
+/// The summary of `sample`.
+pub fn sample(written: &SampleJson) -> String {
+    let mut s = Sheet::new(&written.file);
+    s.row("way-points", &count(written.points));
+    s.row("size", &bytes(written.file_bytes));
     s.text
 }
 

@@ -2,8 +2,11 @@
 
 mod files;
 mod fitting;
+mod job;
 mod outcome;
 mod playback;
+mod points;
+mod program;
 mod walk;
 
 use std::io::Write;

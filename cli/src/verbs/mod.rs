@@ -3,6 +3,7 @@
 pub mod inspect;
 pub mod plan;
 pub mod run;
+pub mod sample;
 pub mod verify;
 
 /// How a verb ended.

@@ -398,6 +398,8 @@ pub(crate) fn outcome(simulated: bool) -> Outcome {
     let c = report.counts;
     let json = PlanJson {
         job: report.job.clone(),
+        job_kind: "program",
+        way_points: None,
         machine: report.machine.clone(),
         axes: report.axes.iter().map(|a| AxisJson { name: a.name.clone(), unit: a.unit.clone() }).collect(),
         blocks: c.blocks,
@@ -439,6 +441,8 @@ pub(crate) fn outcome(simulated: bool) -> Outcome {
         plan_seconds: 0.412,
         peak_memory_mib: Some(48.0),
         solver: "interior-point".into(),
+        jerk_form: "true".into(),
+        windows: "overlap".into(),
         iterations: report.planning.iterations,
         certificate: report.certificate.verdict,
         simulation: simulated.then_some(simulation),
