@@ -27,6 +27,8 @@ pub enum Verb {
     Plan(PlanArgs),
     /// Plan a job and play its table on simulated drives
     Run(RunArgs),
+    /// Plan a job by several methods and show them side by side
+    Compare(CompareArgs),
     /// Write a sample way-point job
     Sample(SampleArgs),
     /// Prove a feed table against the limits it carries
@@ -50,6 +52,7 @@ impl Verb {
         match self {
             Verb::Plan(args) => args.speech.talk(),
             Verb::Run(args) => args.plan.speech.talk(),
+            Verb::Compare(args) => args.speech.talk(),
             Verb::Sample(args) => args.speech.talk(),
             Verb::Verify(args) => args.speech.talk(),
             Verb::Inspect(args) => args.speech.talk(),

@@ -9,6 +9,10 @@ use serde::Serialize;
 
 use crate::failure::{Blame, Failure};
 
+mod compare;
+
+pub use compare::{CompareFilesJson, CompareJson, MethodJson, MethodState};
+
 /// The object of `plan` and `run`, also written as plan.json.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanJson {

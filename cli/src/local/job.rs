@@ -33,6 +33,13 @@ pub(super) struct Told {
     pub(super) points: Option<Points>,
 }
 
+impl Told {
+    /// Name of the kind of job.
+    pub(super) fn kind(&self) -> &'static str {
+        if self.points.is_some() { "way-points" } else { "program" }
+    }
+}
+
 /// What is known of a job of way-points.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Points {

@@ -137,7 +137,7 @@ fn plan_json(
     };
     PlanJson {
         job: args.job.file.display().to_string(),
-        job_kind: if told.points.is_some() { "way-points" } else { "program" },
+        job_kind: told.kind(),
         way_points: told.points.as_ref().map(Points::json),
         machine: machine.name.clone(),
         axes: machine.axes.iter().map(|a| AxisJson { name: a.name.clone(), unit: unit(a).into() }).collect(),
@@ -189,7 +189,7 @@ fn named(limit: Binding, machine: &Machine) -> (&'static str, Option<String>) {
     (kind, axis.and_then(|i| machine.axes.get(usize::from(i))).map(|a| a.name.clone()))
 }
 
-fn binding_json(share: &binding::Share, machine: &Machine) -> BindingJson {
+pub(super) fn binding_json(share: &binding::Share, machine: &Machine) -> BindingJson {
     let (kind, axis) = named(share.limit, machine);
     BindingJson { kind, axis, seconds: share.seconds, share: share.share }
 }

@@ -1,5 +1,6 @@
 //! One file per verb.
 
+pub mod compare;
 pub mod inspect;
 pub mod plan;
 pub mod run;

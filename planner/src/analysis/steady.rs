@@ -1,6 +1,7 @@
 //! A path travelled at one speed: how long it is, and how fast that speed may be.
 
 use crate::geometry::grid_path::{GridPath, Piece};
+use crate::geometry::section::{FeedCap, SpeedCap};
 use crate::job::machine::AxisLimits;
 
 /// Nodes and weights of the Gauss-Legendre rule of five points on [-1, 1] (Abramowitz and Stegun, table 25.4).
@@ -24,29 +25,60 @@ pub fn arc_length(path: &GridPath, counted: u16) -> f64 {
             pieces.clear();
             pieces.extend(axes.iter().map(|&axis| path.piece(axis, span)));
             let half = 0.5 * (path.breaks[span + 1] - path.breaks[span]) as f64 * path.step;
-            let slope = |x: f64| pieces.iter().map(|p| p.first(x).powi(2)).sum::<f64>().sqrt();
-            half * GAUSS.iter().map(|(node, weight)| weight * slope(half * (1.0 + node))).sum::<f64>()
+            let at = |node: f64| slope(&pieces, half * (1.0 + node), u16::MAX);
+            half * GAUSS.iter().map(|&(node, weight)| weight * at(node)).sum::<f64>()
         })
         .sum()
 }
 
-/// The largest Euclidean speed over the axes of the bit mask `counted` that keeps every axis within its limits when
-/// it is held all along the path, ramps at the ends apart [axis units/s].
+/// The largest Euclidean speed over the axes of the bit mask `counted` that keeps every axis within its limits, and
+/// the path speed below its caps, when it is held all along the path, ramps at the ends apart [axis units/s].
 ///
 /// Looked at in nine places of every geometry span, so a hair too large where a limit is nearest between two of them;
 /// a plan under this cap keeps the limits there all the same. Zero where the path stands still in the counted axes.
-pub fn largest_steady_speed(path: &GridPath, limits: &[AxisLimits], counted: u16) -> f64 {
+pub fn largest_steady_speed(path: &GridPath, limits: &[AxisLimits], caps: &[FeedCap], counted: u16) -> f64 {
     let mut largest = f64::INFINITY;
+    let mut cap = 0;
     let mut pieces: Vec<Piece> = Vec::with_capacity(path.axes.len());
     for span in 0..path.spans() {
         pieces.clear();
         pieces.extend((0..path.axes.len()).map(|axis| path.piece(axis, span)));
+        let [from, to] = [path.breaks[span], path.breaks[span + 1]];
         for k in 0..PLACES {
-            let x = f64::from(k) / f64::from(PLACES - 1) * pieces.first().map_or(0.0, |p| p.length);
+            let share = f64::from(k) / f64::from(PLACES - 1);
+            let place = from as f64 + share * (to - from) as f64;
+            // At the end of a cap both it and the next one count.
+            while caps.get(cap).is_some_and(|c| (c.until as f64) < place) {
+                cap += 1;
+            }
+            let x = share * (to - from) as f64 * path.step;
             largest = largest.min(speed_at(&pieces, x, limits, counted));
+            let met = caps.get(cap).is_some_and(|c| c.until as f64 == place);
+            for c in caps.iter().skip(cap).take(1 + usize::from(met)) {
+                largest = largest.min(under(c.speed, &pieces, x, counted));
+            }
         }
     }
     if largest.is_finite() { largest } else { 0.0 }
+}
+
+/// |r'| over the axes of a mask.
+fn slope(pieces: &[Piece], x: f64, counted: u16) -> f64 {
+    let axes = pieces.iter().enumerate().filter(|(a, _)| counted >> a & 1 == 1);
+    axes.map(|(_, p)| p.first(x).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The largest speed over the counted axes that a cap allows at one place.
+fn under(cap: SpeedCap, pieces: &[Piece], x: f64, counted: u16) -> f64 {
+    match cap {
+        SpeedCap::None => f64::INFINITY,
+        SpeedCap::Tangential { axes, speed } if axes == counted => speed,
+        SpeedCap::Tangential { axes, speed } => {
+            let own = slope(pieces, x, axes);
+            if own > 0.0 { speed * slope(pieces, x, counted) / own } else { f64::INFINITY }
+        }
+        SpeedCap::Rate(rate) => rate * slope(pieces, x, counted),
+    }
 }
 
 /// The largest steady speed at one place: the derivatives of each axis with respect to the length s along the counted
@@ -127,7 +159,7 @@ mod tests {
             let path = circle(wave);
             let limits = [AxisLimits { velocity, acceleration, jerk }; 3];
             let expected = velocity.min((acceleration * R).sqrt()).min((jerk * R * R).cbrt());
-            let found = largest_steady_speed(&path, &limits, 0b011);
+            let found = largest_steady_speed(&path, &limits, &[], 0b011);
             prop_assert!((found / expected - 1.0).abs() < 0.03, "{found} {expected}");
             prop_assert!((arc_length(&path, 0b011) / (std::f64::consts::TAU * R) - 1.0).abs() < 1e-5);
         }
@@ -136,7 +168,27 @@ mod tests {
     #[test]
     fn a_path_that_does_not_move_the_counted_axes_has_no_speed() {
         let limits = [AxisLimits { velocity: 1.0, acceleration: 1.0, jerk: 1.0 }; 3];
-        assert_eq!(largest_steady_speed(&circle(0.0), &limits, 0b100), 0.0);
+        assert_eq!(largest_steady_speed(&circle(0.0), &limits, &[], 0b100), 0.0);
         assert_eq!(arc_length(&circle(0.0), 0b100), 0.0);
+    }
+
+    #[test]
+    fn caps_bound_the_speed_where_they_hold() {
+        let path = circle(0.3);
+        let limits = [AxisLimits { velocity: 1e3, acceleration: 1e6, jerk: 1e9 }; 3];
+        let (half, end) = (path.grid_length() / 2, path.grid_length());
+        let with = |first: SpeedCap, second: SpeedCap| {
+            let caps = [FeedCap { until: half, speed: first }, FeedCap { until: end, speed: second }];
+            largest_steady_speed(&path, &limits, &caps, 0b011)
+        };
+        let tangential = |axes, speed| SpeedCap::Tangential { axes, speed };
+        assert_eq!(with(SpeedCap::None, tangential(0b011, 7.0)), 7.0);
+        assert_eq!(with(tangential(0b011, 3.0), tangential(0b011, 7.0)), 3.0);
+        // X alone is fastest where it does all the work.
+        assert!((with(SpeedCap::None, tangential(0b001, 7.0)) - 7.0).abs() < 0.01);
+        // |r'| = R d(angle)/du is least in the middle, 0.7 of the mean.
+        let mean = std::f64::consts::TAU * R / path.length();
+        assert!((with(SpeedCap::Rate(2.0), SpeedCap::None) / (2.0 * 0.7 * mean) - 1.0).abs() < 1e-3);
+        assert!((with(SpeedCap::None, SpeedCap::None) / 1e3 - 1.0).abs() < 1e-3);
     }
 }
