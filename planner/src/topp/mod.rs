@@ -9,6 +9,7 @@ mod clarabel;
 mod error;
 mod ipm;
 mod knots;
+mod lanes;
 mod layout;
 pub mod problem;
 mod rest;
@@ -150,19 +151,19 @@ impl Attempt<'_> {
         let problem = self.problem;
         let unit = self.sweep.top();
         let joints = joints(problem, layout);
-        let mut source =
-            RowSource { problem: *problem, layout, unit, ceiling: CEILING, joint: joints, largest_code };
+        let swept = self.swept(layout);
+        let mut source = self.source(layout, &swept, joints, largest_code);
         let mut worst = 1;
         for _ in 0..MOST_RESCALES {
             source.joint = joints.map(|q| (q / unit).min(source.ceiling));
             let scale = rounding::scale(&source);
             let half = rounding::halves(&source, scale, self.sweep);
-            if let Some(x) = self.optimise(&source, &half, iterations) {
+            if let Some((x, gap_s)) = self.optimise(&source, &half, iterations) {
                 let table = rounding::table(&source, scale, &x);
                 let rounded = rounding::values(&source, &table);
                 let findings = check::rows(&source, &rounded, &half);
                 if findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC {
-                    return Ok(Plan { table, binding: findings.binding, iterations: 0 });
+                    return Ok(Plan { table, binding: findings.binding, iterations: 0, gap_s });
                 }
                 worst = findings.span;
             }
@@ -183,18 +184,18 @@ impl Attempt<'_> {
         const SCALINGS: usize = 40;
         let unit = self.sweep.top();
         let joint = joints(self.problem, layout).map(|q| (q / unit).min(CEILING));
-        let (problem, largest_code) = (*self.problem, rounding::LONG_CODE);
-        let source = RowSource { problem, layout, unit, ceiling: CEILING, joint, largest_code };
+        let swept = self.swept(layout);
+        let source = self.source(layout, &swept, joint, rounding::LONG_CODE);
         let scale = rounding::scale(&source);
         let half = rounding::halves(&source, scale, self.sweep);
         let sound = |x: &[f64]| {
             let table = rounding::table(&source, scale, x);
             let findings = check::rows(&source, &rounding::values(&source, &table), &half);
             let keeps = findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC;
-            let plan = Plan { table, binding: findings.binding, iterations: 0 };
+            let plan = Plan { table, binding: findings.binding, iterations: 0, gap_s: f64::INFINITY };
             (keeps && check::format(layout, &plan.table).is_none()).then_some(plan)
         };
-        let mut slow = start::profile(&source);
+        let mut slow = start::profile(&source).x;
         let slowest = (0..SCALINGS).find_map(|_| {
             let plan = sound(&slow);
             if plan.is_none() {
@@ -202,7 +203,7 @@ impl Attempt<'_> {
             }
             plan
         })?;
-        let fast = self.optimise(&source, &half, iterations).unwrap_or_else(|| slow.clone());
+        let fast = self.optimise(&source, &half, iterations).map_or_else(|| slow.clone(), |(x, _)| x);
         let between = |share: f64| -> Vec<f64> {
             slow.iter().zip(&fast).map(|(slow, fast)| slow + share * (fast - slow)).collect()
         };
@@ -210,27 +211,60 @@ impl Attempt<'_> {
         Some(Plan { iterations: *iterations, ..plan })
     }
 
-    /// Control values of minimum time; `None` where rounding alone would break a limit at any speed.
-    fn optimise(&self, source: &RowSource, half: &[f64], iterations: &mut u64) -> Option<Vec<f64>> {
-        let mut x = start::profile(source);
+    /// What rows are made from on given knots.
+    fn source<'s>(
+        &'s self,
+        layout: &'s Layout,
+        swept: &'s [f64],
+        joint: [f64; 2],
+        largest_code: f64,
+    ) -> RowSource<'s> {
+        let Settings { jerk, rows: form, .. } = *self.settings;
+        let (problem, unit) = (*self.problem, self.sweep.top());
+        RowSource {
+            problem,
+            layout,
+            unit,
+            ceiling: CEILING,
+            joint,
+            largest_code,
+            swept,
+            jerk,
+            form,
+            bends: true,
+        }
+    }
+
+    /// Largest swept x on each inner span.
+    fn swept(&self, layout: &Layout) -> Vec<f64> {
+        let (path, unit) = (self.problem.path, self.sweep.top());
+        let mut hint = 0;
+        (1..layout.spans() - 1)
+            .map(|i| {
+                let (from, to) = (layout.start(path, i), layout.start(path, i + 1));
+                self.sweep.largest(from, to, &mut hint) / unit
+            })
+            .collect()
+    }
+
+    /// Control values of minimum time, and how far above the optimum they may be [s]; `None` where rounding alone
+    /// would break a limit at any speed.
+    fn optimise(&self, source: &RowSource, half: &[f64], iterations: &mut u64) -> Option<(Vec<f64>, f64)> {
+        let start::Start { mut x, bends } = start::profile(source);
+        let source = &RowSource { bends, ..source.clone() };
         let gap = self.settings.relative_gap;
         match self.settings.solver {
-            Solver::InteriorPoint => *iterations += window::solve(source, &mut x, half, gap, self.whole)?,
+            Solver::InteriorPoint => {
+                let total = window::solve(source, &mut x, half, gap, self.whole)?;
+                *iterations += total.iterations;
+                Some((x, total.gap / source.unit.sqrt()))
+            }
             Solver::Clarabel => {
-                let (layout, path) = (source.layout, source.problem.path);
-                let mut hint = 0;
-                let swept: Vec<f64> = (1..layout.spans() - 1)
-                    .map(|i| {
-                        let (from, to) = (layout.start(path, i), layout.start(path, i + 1));
-                        self.sweep.largest(from, to, &mut hint) / source.unit
-                    })
-                    .collect();
-                let (answer, count) = clarabel::solve(source, &swept, &x, half, gap)?;
-                *iterations += count;
-                x = answer;
+                let answer = clarabel::solve(source, &x, half, gap)?;
+                *iterations += answer.iterations;
+                Some((answer.x, answer.gap / source.unit.sqrt()))
             }
         }
-        Some(x)
     }
 }
 

@@ -4,7 +4,7 @@
 //! conditions alone: between rests a feasible start always exists.
 
 use super::layout::{Derivatives, Pieces};
-use super::rows::RowSource;
+use super::rows::{RowSource, dot};
 use crate::job::machine::MAX_AXES;
 
 /// Share of the acceleration limit the start's slope may use.
@@ -15,9 +15,23 @@ const JERK_SHARE: f64 = 0.6;
 const JOINT_SHARE: f64 = 0.25;
 /// Scale of the first attempt.
 const SCALE: f64 = 0.7;
+/// Most that neighbouring control values differ where the profile had to be made gentler.
+const GENTLE: f64 = 1.25;
+/// Share of the bend a span may have that the start uses.
+const BEND_SHARE: f64 = 0.9;
 
-/// Control values of x, one per inner span; feasible as they are or after scaling down.
-pub(super) fn profile(rows: &RowSource) -> Vec<f64> {
+/// Where to start from.
+#[derive(Clone, Debug)]
+pub(super) struct Start {
+    /// Control values of x, one per inner span; feasible as they are or after scaling down.
+    pub(super) x: Vec<f64>,
+    /// Whether no span bends more than the table's format allows; on knots forced to lie very unevenly none may be
+    /// found.
+    pub(super) bends: bool,
+}
+
+/// A profile to start from.
+pub(super) fn profile(rows: &RowSource) -> Start {
     let layout = rows.layout;
     let m = layout.unknowns();
     let h = &layout.h;
@@ -33,16 +47,59 @@ pub(super) fn profile(rows: &RowSource) -> Vec<f64> {
         let rise = slope[s].min(slope[s - 1]) * (middles[s] - middles[s - 1]);
         x[s - 1] = x[s - 1].min(x[s] + rise);
     }
+    let gentle = {
+        let mut x = x.clone();
+        (1..m).for_each(|s| x[s] = x[s].min(GENTLE * x[s - 1]));
+        (1..m).rev().for_each(|s| x[s - 1] = x[s - 1].min(GENTLE * x[s]));
+        x
+    };
     for _ in 0..2 {
         smooth(&mut x, h, &middles, 0.5 * smoothing_width(rows));
     }
     let length = middles[m - 1] + 0.5 * h[m] + h[m + 1];
-    for (s, x) in x.iter_mut().enumerate() {
-        let launch = JOINT_SHARE * rows.joint[0] * (middles[s] / h[0]).powf(4.0 / 3.0);
-        let landing = JOINT_SHARE * rows.joint[1] * ((length - middles[s]) / h[m + 1]).powf(4.0 / 3.0);
-        *x = SCALE / (1.0 / *x + 1.0 / launch + 1.0 / landing);
+    // Between two rests and nothing else.
+    let free: Vec<f64> = middles
+        .iter()
+        .map(|u| {
+            let launch = JOINT_SHARE * rows.joint[0] * (u / h[0]).powf(4.0 / 3.0);
+            let landing = JOINT_SHARE * rows.joint[1] * ((length - u) / h[m + 1]).powf(4.0 / 3.0);
+            1.0 / (1.0 / launch + 1.0 / landing)
+        })
+        .collect();
+    let between = |x: &[f64]| -> Vec<f64> {
+        x.iter().zip(&free).map(|(x, free)| SCALE / (1.0 / x + 1.0 / free)).collect()
+    };
+    let x = between(&x);
+    if bends(rows, &x) {
+        return Start { x, bends: true };
     }
-    x
+    let gentle = between(&gentle);
+    if bends(rows, &gentle) {
+        return Start { x: gentle, bends: true };
+    }
+    // A motion between rests and nothing else bends least: as much of it as is needed.
+    const MOST_DOUBLINGS: i32 = 60;
+    let mixed = (0..MOST_DOUBLINGS)
+        .map(|k| {
+            let share = 1e-6 * 2f64.powi(k);
+            x.iter().zip(&free).map(|(x, free)| x + share * free).collect::<Vec<f64>>()
+        })
+        .find(|x| bends(rows, x));
+    match mixed {
+        Some(x) => Start { x, bends: true },
+        None => Start { x, bends: false },
+    }
+}
+
+/// Whether no span bends more than the format allows; scaling does not change that.
+fn bends(rows: &RowSource, x: &[f64]) -> bool {
+    let m = x.len();
+    (0..m).all(|s| {
+        let get = |j: usize| if j == 0 || j > m { 0.0 } else { x[j - 1] };
+        let c = [get(s), get(s + 1), get(s + 2)];
+        let b = rows.bezier(s).map(|b| dot(&b, &c));
+        (b[0] - 2.0 * b[1] + b[2]).abs() <= 0.25 * BEND_SHARE * (b[0] + b[2])
+    })
 }
 
 /// Middles of the inner spans in u: where their control values sit.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::ipm::{SCALINGS, START_SLACK, Stretch, Workspace};
+use super::ipm::{Run, SCALINGS, START_SLACK, Stretch, Workspace};
 use super::rows::RowSource;
 
 /// Spans per window.
@@ -16,6 +16,22 @@ const JOINT_MARGIN: f64 = 5e-3;
 /// Longest problem that is solved in one piece.
 pub(super) const WHOLE: usize = WINDOW + WINDOW / 4;
 
+/// All runs together.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Total {
+    /// Iterations.
+    pub(super) iterations: u64,
+    /// What the control values can at most be above the optimum of every stretch with the others held, as the
+    /// kernel counts time.
+    pub(super) gap: f64,
+}
+
+impl Total {
+    fn of(run: Run) -> Self {
+        Total { iterations: u64::from(run.iterations), gap: run.gap }
+    }
+}
+
 /// Turns the start profile `x` into the optimum and returns the iterations; `None` when no scale makes it feasible.
 pub(super) fn solve(
     source: &RowSource,
@@ -23,15 +39,15 @@ pub(super) fn solve(
     half: &[f64],
     relative_gap: f64,
     whole: usize,
-) -> Option<u64> {
+) -> Option<Total> {
     let m = x.len();
     if m <= whole {
         let mut work = Workspace::default();
         work.load(source, x, half, Stretch { from: 0, to: m }, |_| 0.0);
         work.scale_into()?;
-        let iterations = work.solve(relative_gap);
+        let run = work.solve(relative_gap);
         *x = work.moved();
-        return Some(u64::from(iterations));
+        return Some(Total::of(run));
     }
     scale_all(source, x, half)?;
     let count = m.div_ceil(WINDOW);
@@ -54,7 +70,8 @@ pub(super) fn solve(
     let seams: Vec<Stretch> =
         joints[1..count].iter().map(|&j| Stretch { from: j - REACH, to: j + REACH }).collect();
     let second = stage(source, x, half, &seams, |_| 0.0, relative_gap);
-    Some(first + second)
+    // The second stage starts where the first ended, and what it leaves undone comes on top.
+    Some(Total { iterations: first.iterations + second.iterations, gap: first.gap + second.gap })
 }
 
 /// Solves disjoint stretches that share no row, all from the same `x`.
@@ -65,24 +82,25 @@ fn stage(
     stretches: &[Stretch],
     margin: impl Fn(usize) -> f64 + Sync,
     relative_gap: f64,
-) -> u64 {
+) -> Total {
     let before: &[f64] = x;
-    let solved: Vec<(Vec<f64>, u32)> = stretches
+    let solved: Vec<(Vec<f64>, Run)> = stretches
         .par_iter()
         .map_init(Workspace::default, |work, &stretch| {
             work.load(source, before, half, stretch, &margin);
-            let iterations = if work.settle() > 0.0 { work.solve(relative_gap) } else { 0 };
-            (if iterations == 0 { Vec::new() } else { work.moved() }, iterations)
+            let run = if work.settle() > 0.0 { work.solve(relative_gap) } else { Run::default() };
+            (if run.iterations == 0 { Vec::new() } else { work.moved() }, run)
         })
         .collect();
-    let mut iterations = 0;
-    for (stretch, (values, count)) in stretches.iter().zip(solved) {
+    let mut total = Total::default();
+    for (stretch, (values, run)) in stretches.iter().zip(solved) {
         if !values.is_empty() {
             x[stretch.from..stretch.to].copy_from_slice(&values);
         }
-        iterations += u64::from(count);
+        total.iterations += u64::from(run.iterations);
+        total.gap += run.gap;
     }
-    iterations
+    total
 }
 
 /// Scales the whole profile until its least slack is comfortable everywhere.
