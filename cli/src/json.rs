@@ -84,6 +84,8 @@ pub struct PlanJson {
     pub windows: String,
     /// Its iterations, all sections together.
     pub iterations: u64,
+    /// What it left at most, as a share of the motion time; null when it cannot tell.
+    pub gap_estimate: Option<f64>,
     /// The proof.
     pub certificate: CertificateJson,
     /// The simulated motion; only `run` has it.

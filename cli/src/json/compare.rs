@@ -67,6 +67,8 @@ pub struct MethodJson {
     pub spans: Option<u64>,
     /// Iterations of the solver.
     pub iterations: Option<u64>,
+    /// What the solver left at most, as a share of the traverse time.
+    pub gap_estimate: Option<f64>,
     /// The one speed of the method `constant-feed` [mm/s].
     pub constant_feed_mm_s: Option<f64>,
     /// Time lost against the programmed feed [s]; null when no feed is in force.

@@ -15,7 +15,7 @@ use planner::tolerances::CERTIFICATE_RATIO;
 
 use super::fitting::unplannable;
 use super::job::{self, Points, placed};
-use super::outcome::{binding_json, report_axes, unit};
+use super::outcome::{binding_json, report_axes, share, unit};
 use super::playback::{self, record};
 use crate::args::{self, CompareArgs, Jerk, Method};
 use crate::engine::Compared;
@@ -193,6 +193,7 @@ fn fill(row: &mut MethodJson, found: Found, method: Method, task: &Task, axes: &
     prove(row, &found.planned, method, task);
     row.spans = Some(found.planned.iter().map(|s| s.table.spans() as u64).sum());
     row.iterations = Some(found.iterations);
+    row.gap_estimate = share(found.gap_s, found.traverse_s);
     let (mut shares, mut slow) = (BindingShares::default(), Shortfalls::new(0));
     let mut binding = Vec::with_capacity(found.planned.len());
     for (section, stretch) in found.planned.iter().zip(&task.stretches) {

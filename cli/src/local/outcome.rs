@@ -176,11 +176,17 @@ fn plan_json(
         jerk_form: args::name(fitted.jerk),
         windows: args::name(args.windows),
         iterations: plan.iterations,
+        gap_estimate: share(plan.gap_s, motion_time_s),
         certificate: verdict(fitted),
         simulation: drives.map(simulation_json),
         notes: notes(fitted),
         files: FilesJson::default(),
     }
+}
+
+/// A gap as a share of the time; `None` where it is not known or there is no motion.
+pub(super) fn share(gap_s: f64, time_s: f64) -> Option<f64> {
+    Some(gap_s / time_s).filter(|share| share.is_finite())
 }
 
 /// Kind of a limit, and its axis by name.
@@ -314,6 +320,7 @@ fn report(
     stops.sort_by_key(|s| std::cmp::Reverse(s.count));
     Report {
         job: name,
+        way_points: json.way_points.clone(),
         machine: json.machine.clone(),
         times: model::Times {
             cycle_s: json.cycle_time_s,

@@ -85,10 +85,7 @@ fn tell(points: &WayPoints<'_>, feed: Option<f64>, machine: &Machine) -> Told {
     let mut start = points.point(0);
     for i in 1..points.count() {
         let end = points.point(i);
-        for axis in 0..machine.axes.len() {
-            whole.min[axis] = whole.min[axis].min(end[axis]);
-            whole.max[axis] = whole.max[axis].max(end[axis]);
-        }
+        whole.hold(&end);
         comparison.add(&Move {
             kind: MoveKind::Feed,
             shape: Shape::Line,

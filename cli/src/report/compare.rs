@@ -1,13 +1,14 @@
 //! The page of `compare`: a table of methods, what limits each, and their motion over time.
 
 use maud::{Markup, html};
+use planner::tolerances::CERTIFICATE_RATIO;
 use serde::Serialize;
 
 use super::colour;
 use super::data::{Band, Series, band, fine, text};
 use super::html::shell;
-use super::model::{Axis, Limit, Motion};
-use super::words::{count, duration, length, number, percent};
+use super::model::{Axis, Envelope, Limit, Motion};
+use super::words::{count, duration, length, number, percent, times};
 use crate::engine::Compared;
 use crate::json::{BindingJson, CompareJson, MethodJson, MethodState};
 
@@ -88,7 +89,7 @@ pub fn page(compared: &Compared) -> String {
         (header(json))
         (table(json))
         (limiting(json, axes))
-        @if !drawn.is_empty() { (plots(json, axes, &drawn)) }
+        @if !drawn.is_empty() { (plots(compared, &drawn)) }
         (meaning(json))
     };
     let methods = json.methods.iter().zip(motions).enumerate();
@@ -146,22 +147,23 @@ fn figure(value: Option<String>) -> Markup {
     html! { td.n { (value.unwrap_or_else(|| NOTHING.into())) } }
 }
 
-/// Change against the whole path in one piece: `+0.012 %`.
+/// Traverse time against that of the whole path in one piece: `+0.0120 %`, `62.2 times`.
 pub(crate) fn change(share: f64) -> String {
+    if share >= 1.0 {
+        return times(1.0 + share);
+    }
     let percent = 100.0 * share;
     let decimals: usize = if percent.abs() < 1.0 { 4 } else { 2 };
-    // No sign on what rounds to nothing.
     let text = format!("{percent:+.decimals$} %");
-    if text.trim_start_matches(['+', '-']).trim_start_matches(['0', '.']) == " %" {
-        "0 %".into()
-    } else {
-        text
-    }
+    // No sign on what rounds to nothing.
+    if text.contains(|c: char| ('1'..='9').contains(&c)) { text } else { "0 %".into() }
 }
 
-fn ratio(value: Option<f64>) -> Markup {
+/// A ratio; one above its limit stands out where the method was given that limit.
+fn ratio(value: Option<f64>, given: bool) -> Markup {
     match value {
-        Some(r) if r > 1.000_001 => html! { td.n { b.bad { (format!("{r:.4}")) } } },
+        Some(r) if r > 1.0 + CERTIFICATE_RATIO && given => html! { td.n { b.bad { (format!("{r:.4}")) } } },
+        Some(r) if !given => html! { td.n { span.dim { (format!("{r:.4}")) } } },
         value => figure(value.map(|r| format!("{r:.4}"))),
     }
 }
@@ -205,8 +207,8 @@ fn table(json: &CompareJson) -> Markup {
                                     None => (NOTHING),
                                 }
                             }
-                            (ratio(m.velocity_ratio)) (ratio(m.acceleration_ratio)) (ratio(m.jerk_ratio))
-                            @if feed { (ratio(m.feed_ratio)) (figure(m.lost_s.map(duration))) }
+                            (ratio(m.velocity_ratio, true)) (ratio(m.acceleration_ratio, true)) (ratio(m.jerk_ratio, m.jerk_form != "none"))
+                            @if feed { (ratio(m.feed_ratio, true)) (figure(m.lost_s.map(duration))) }
                             (figure(m.spans.map(count)))
                             (figure(m.iterations.map(count)))
                         }
@@ -252,7 +254,10 @@ fn limiting(json: &CompareJson, axes: &[Axis]) -> Markup {
                     }
                 } } }
                 ul.legend { @for limit in seen {
-                    li { i style=(format!("background:{}", colour::of_limit(limit))) {} (limit.words(axes)) }
+                    li {
+                        i style=(format!("background:{}", colour::of_limit(limit))) {}
+                        @if limit == Limit::Feed { "feed" } @else { (limit.words(axes)) }
+                    }
                 } }
             }
         }
@@ -281,7 +286,12 @@ fn plot(kind: &str, axis: Option<usize>, title: &str, unit: &str) -> Markup {
     }
 }
 
-fn plots(json: &CompareJson, axes: &[Axis], drawn: &[usize]) -> Markup {
+fn plots(compared: &Compared, drawn: &[usize]) -> Markup {
+    let Compared { json, axes, motions } = compared;
+    // Axes that stand still all along have nothing to show.
+    let moves = |e: &Envelope| e.lo.iter().chain(&e.hi).any(|v| *v != 0.0);
+    let traces = |axis: usize| motions.iter().flatten().filter_map(move |m| m.traces.axes.get(axis));
+    let moving: Vec<bool> = (0..axes.len()).map(|i| traces(i).any(|t| moves(&t.velocity))).collect();
     let named = |i: usize| DRAWN.contains(&json.methods[i].method.as_str());
     let any = drawn.iter().any(|&i| named(i));
     html! {
@@ -296,7 +306,7 @@ fn plots(json: &CompareJson, axes: &[Axis], drawn: &[usize]) -> Markup {
             } }
             (plot("speed", None, "Path speed", "mm/s"))
             div.triple {
-                @for (i, a) in axes.iter().enumerate() {
+                @for (i, a) in axes.iter().enumerate().filter(|(i, _)| moving[*i]) {
                     (plot("v", Some(i), &format!("{} velocity", a.name), &format!("{}/s", a.unit)))
                     (plot("a", Some(i), &format!("{} acceleration", a.name), &format!("{}/s\u{00b2}", a.unit)))
                     (plot("j", Some(i), &format!("{} jerk", a.name), &format!("{}/s\u{00b3}", a.unit)))

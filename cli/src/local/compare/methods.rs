@@ -31,6 +31,8 @@ pub(super) struct Found {
     /// What it has planned, one per stretch; empty for the sweep.
     pub(super) planned: Vec<PlannedSection>,
     pub(super) iterations: u64,
+    /// What the solver left at most [s].
+    pub(super) gap_s: f64,
     /// The one speed of the constant feed.
     pub(super) steady: Option<f64>,
 }
@@ -137,7 +139,14 @@ fn once(method: Method, task: &Task) -> Result<Found, Fault> {
     if method == Method::Sweep {
         let times: Vec<f64> = jobs.map(|(s, asked)| Sweep::new(&asked.problem(s, task)).duration()).collect();
         let (compute_s, traverse_s) = (begin.elapsed().as_secs_f64(), times.iter().sum());
-        return Ok(Found { compute_s, traverse_s, planned: Vec::new(), iterations: 0, steady: None });
+        return Ok(Found {
+            compute_s,
+            traverse_s,
+            planned: Vec::new(),
+            iterations: 0,
+            gap_s: 0.0,
+            steady: None,
+        });
     }
     let plans: Vec<_> = jobs.map(|(s, asked)| topp::plan(&asked.problem(s, task), &settings)).collect();
     let mut found = Found {
@@ -145,6 +154,7 @@ fn once(method: Method, task: &Task) -> Result<Found, Fault> {
         traverse_s: 0.0,
         planned: Vec::with_capacity(plans.len()),
         iterations: 0,
+        gap_s: 0.0,
         steady: steady.map(|[linear, rotary]| linear.min(rotary)),
     };
     for ((stretch, plan), asked) in task.stretches.iter().zip(plans).zip(asked) {
@@ -152,6 +162,7 @@ fn once(method: Method, task: &Task) -> Result<Found, Fault> {
         let plan = plan.map_err(|fault| Fault::Plan(line_of(&fault, section), fault))?;
         found.traverse_s += plan.table.duration();
         found.iterations += plan.iterations;
+        found.gap_s += plan.gap_s;
         let mut marks = section.marks.clone();
         marks.caps = asked.caps;
         let (kind, limits) = (section.kind, asked.limits);
