@@ -15,7 +15,6 @@ pub use samples::{Samples, SamplesError};
 
 use super::layout::{Pieces, strictest};
 use super::problem::Problem;
-use crate::job::machine::MAX_AXES;
 
 /// q*(u) at stations along the path.
 #[derive(Clone, Debug)]
