@@ -86,7 +86,11 @@ pub(super) fn profile(rows: &RowSource) -> Start {
         })
         .find(|x| bends(rows, x));
     match mixed {
-        Some(x) => Start { x, bends: true },
+        Some(mixed) => {
+            // As much of it as the profile allows everywhere.
+            let scale = x.iter().zip(&mixed).map(|(x, mixed)| x / mixed).fold(1.0, f64::min);
+            Start { x: mixed.into_iter().map(|x| x * scale).collect(), bends: true }
+        }
         None => Start { x, bends: false },
     }
 }
