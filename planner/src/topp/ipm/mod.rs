@@ -3,6 +3,8 @@
 
 mod band;
 mod block;
+#[cfg(test)]
+mod tests;
 
 use pulp::{Arch, Simd, WithSimd};
 
