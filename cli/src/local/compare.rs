@@ -28,10 +28,11 @@ use crate::report::record::Recorder;
 use methods::{Fault, Found};
 
 /// The order in which methods run and are shown when none is named.
-const ALL: [Method; 9] = [
+const ALL: [Method; 10] = [
     Method::Whole,
     Method::Zhao,
     Method::Overlap,
+    Method::Fine,
     Method::ConstantFeed,
     Method::PseudoJerk,
     Method::NoJerk,

@@ -27,7 +27,7 @@ fn methods_on_a_circle_come_out_in_their_order() {
     let told = tell(home.path(), "compare", &file, &["--spline", "periodic"]);
     let names: Vec<&str> =
         told["methods"].as_array().unwrap().iter().map(|m| m["method"].as_str().unwrap()).collect();
-    let all = "whole zhao overlap constant-feed pseudo-jerk no-jerk sweep clarabel collocation";
+    let all = "whole zhao overlap fine constant-feed pseudo-jerk no-jerk sweep clarabel collocation";
     assert_eq!(names, all.split(' ').collect::<Vec<_>>());
     let time = |name: &str| number(method(&told, name), "traverse_time_s");
     let whole = time("whole");
@@ -36,6 +36,10 @@ fn methods_on_a_circle_come_out_in_their_order() {
     for name in ["zhao", "overlap", "clarabel"] {
         assert!((time(name) / whole - 1.0).abs() < 2e-3, "{name}: {}", time(name));
     }
+    // What the usual number of spans costs.
+    assert!(time("fine") < whole * 1.0001 && time("fine") > whole * 0.998, "{}", time("fine") / whole);
+    let spans = |name: &str| number(method(&told, name), "spans");
+    assert!(spans("fine") > spans("whole"));
     assert!(time("no-jerk") < whole && time("pseudo-jerk") > whole && time("collocation") < whole * 1.001);
     assert!((time("sweep") / time("no-jerk") - 1.0).abs() < 0.01);
 
