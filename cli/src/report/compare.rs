@@ -31,8 +31,8 @@ const METHODS: [(&str, &str); 10] = [
     ("overlap", "The same limits; windows are solved side by side, then once more round their joints."),
     (
         "fine",
-        "The problem of \u{201c}whole\u{201d} on eight times as many spans per ramp: what it saves is what the usual number \
-         of spans and the rounding of the table cost.",
+        "The problem of \u{201c}whole\u{201d} on eight times as many spans per ramp, as far as the control tick and the \
+         rounding of the table allow: what it saves is what the usual number of spans costs.",
     ),
     (
         "constant-feed",
