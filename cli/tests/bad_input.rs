@@ -275,6 +275,8 @@ fn files_of_way_points_that_are_none() {
     points_refused("X,Y\n1,2\n3\n", &[], Some((3, 1)), "1 fields, the header has 2");
     points_refused("X,Y\n1,2\n3,4,5\n", &[], Some((3, 3)), "3 fields");
     points_refused("X,Y\n1,2\n3,four\n", &[], Some((3, 3)), "not a number");
+    // Columns count bytes.
+    points_refused("X,Y\n\"1\",\u{a0}2\n\u{e9},4\n", &[], Some((2, 5)), "not a number");
     points_refused("X,Y\n1,nan\n3,4\n", &[], Some((2, 3)), "not a finite number");
     points_refused("X,Y\n1,2\n3,1e400\n", &[], Some((3, 3)), "not a finite number");
     points_refused("X,Y\n1,2\n3,301\n", &[], Some((3, 3)), "outside its travel");
