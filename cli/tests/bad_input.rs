@@ -286,6 +286,8 @@ fn files_of_way_points_that_are_none() {
     let open: String = (0..5).map(row).collect();
     points_refused(format!("X,Y\n{open}"), &["--spline", "periodic"], Some((6, 1)), "not closed");
     points_refused("X,Y\n1,2\n3,4\n", &["--spline", "periodic"], None, "at least");
+    let slow = "X,Y\n0,0\n100,0\n200,5\n300,0\n";
+    points_refused(slow, &["--feed", "0.0001"], Some((3, 1)), "too many for one section");
     let wild = "X,Y\n0,0\n399,1\n399.001,2\n0,3\n-399,299\n1,0\n";
     points_refused(wild, &["--knots", "uniform"], Some((3, 1)), "outside its travel");
 }

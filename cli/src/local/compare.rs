@@ -143,7 +143,8 @@ pub(super) fn compare(args: &CompareArgs, progress: &mut Progress) -> Result<Com
         rows.push(row);
         motions.push(motion);
     }
-    if let (true, Some(fault)) = (rows.iter().all(|row| row.traverse_time_s.is_none()), first_fault) {
+    // The sweep gives a time whether or not a table can hold the motion.
+    if let (true, Some(fault)) = (rows.iter().all(|row| row.state != MethodState::Planned), first_fault) {
         return Err(match fault {
             Fault::Plan(line, fault) => unplannable(&args.job, line, &fault),
             fault @ Fault::NoSteadySpeed => placed(fault.to_string(), &args.job.file, None, None)
