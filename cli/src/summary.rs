@@ -42,6 +42,9 @@ pub fn plan(p: &PlanJson) -> String {
         s.row("bus", &format!("{} frames, {}, busy {}", count(frames), bytes(size), percent(load)));
     }
     let memory = p.peak_memory_mib.map(|m| format!(", {m:.0} MiB")).unwrap_or_default();
+    let gap = p.gap_estimate.map(|g| format!(", at most {:.4} % left", 100.0 * g)).unwrap_or_default();
+    let jerk = if p.jerk_form == "none" { "no".into() } else { p.jerk_form.clone() };
+    s.row("solver", &format!("{}, {jerk} jerk, {} iterations{gap}", p.solver, count(p.iterations)));
     s.row("planned in", &format!("{}{memory}", duration(p.plan_seconds)));
     for note in p.notes.iter().take(NOTES) {
         s.row("note", &format!("line {}: {}", note.line, note.text));

@@ -275,6 +275,8 @@ fn files_of_way_points_that_are_none() {
     points_refused("X,Y\n1,2\n3\n", &[], Some((3, 1)), "1 fields, the header has 2");
     points_refused("X,Y\n1,2\n3,4,5\n", &[], Some((3, 3)), "3 fields");
     points_refused("X,Y\n1,2\n3,four\n", &[], Some((3, 3)), "not a number");
+    // Columns count bytes.
+    points_refused("X,Y\n\"1\",\u{a0}2\n\u{e9},4\n", &[], Some((2, 5)), "not a number");
     points_refused("X,Y\n1,nan\n3,4\n", &[], Some((2, 3)), "not a finite number");
     points_refused("X,Y\n1,2\n3,1e400\n", &[], Some((3, 3)), "not a finite number");
     points_refused("X,Y\n1,2\n3,301\n", &[], Some((3, 3)), "outside its travel");
@@ -284,6 +286,8 @@ fn files_of_way_points_that_are_none() {
     let open: String = (0..5).map(row).collect();
     points_refused(format!("X,Y\n{open}"), &["--spline", "periodic"], Some((6, 1)), "not closed");
     points_refused("X,Y\n1,2\n3,4\n", &["--spline", "periodic"], None, "at least");
+    let slow = "X,Y\n0,0\n100,0\n200,5\n300,0\n";
+    points_refused(slow, &["--feed", "0.0001"], Some((3, 1)), "too many for one section");
     let wild = "X,Y\n0,0\n399,1\n399.001,2\n0,3\n-399,299\n1,0\n";
     points_refused(wild, &["--knots", "uniform"], Some((3, 1)), "outside its travel");
 }

@@ -28,10 +28,11 @@ use crate::report::record::Recorder;
 use methods::{Fault, Found};
 
 /// The order in which methods run and are shown when none is named.
-const ALL: [Method; 9] = [
+const ALL: [Method; 10] = [
     Method::Whole,
     Method::Zhao,
     Method::Overlap,
+    Method::Fine,
     Method::ConstantFeed,
     Method::PseudoJerk,
     Method::NoJerk,
@@ -142,7 +143,8 @@ pub(super) fn compare(args: &CompareArgs, progress: &mut Progress) -> Result<Com
         rows.push(row);
         motions.push(motion);
     }
-    if let (true, Some(fault)) = (rows.iter().all(|row| row.traverse_time_s.is_none()), first_fault) {
+    // The sweep gives a time whether or not a table can hold the motion.
+    if let (true, Some(fault)) = (rows.iter().all(|row| row.state != MethodState::Planned), first_fault) {
         return Err(match fault {
             Fault::Plan(line, fault) => unplannable(&args.job, line, &fault),
             fault @ Fault::NoSteadySpeed => placed(fault.to_string(), &args.job.file, None, None)

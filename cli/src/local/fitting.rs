@@ -18,6 +18,10 @@ use crate::progress::Progress;
 /// Bytes of a program that are read ahead to tell how long it is.
 const READ_AHEAD: usize = 1 << 16;
 
+/// What to do about way-points that no motion can be planned through.
+const POINTS_REMEDY: &str = "Check the way-points round this line, --feed, and the axis limits of the machine file; \
+                             --knots chord spreads the parameter by distance.";
+
 /// A planned job with everything that is known of it.
 #[derive(Debug)]
 pub(super) struct Fitted {
@@ -82,7 +86,8 @@ fn settings(args: &PlanArgs, jerk: Jerk) -> Settings {
 
 /// A section that cannot be planned.
 pub(super) fn unplannable(args: &JobArgs, line: u32, fault: &PlanError) -> Failure {
-    placed(fault.to_string(), &args.file, Some(line), None).with_help(remedy(fault))
+    let help = if args.way_points() { POINTS_REMEDY } else { remedy(fault) };
+    placed(fault.to_string(), &args.file, Some(line), None).with_help(help)
 }
 
 /// What to do about a section that cannot be planned.

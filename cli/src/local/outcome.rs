@@ -366,6 +366,9 @@ fn report(
         planning: model::Planning {
             solver: json.solver.clone(),
             iterations: json.iterations,
+            gap: json.gap_estimate,
+            jerk_form: json.jerk_form.clone(),
+            windows: json.windows.clone(),
             seconds: json.plan_seconds,
             peak_memory_mib: json.peak_memory_mib,
         },

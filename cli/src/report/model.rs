@@ -236,6 +236,12 @@ pub struct Planning {
     pub solver: String,
     /// Its iterations, all windows together.
     pub iterations: u64,
+    /// What it left at most, as a share of the motion time.
+    pub gap: Option<f64>,
+    /// How jerk is limited, as on the command line.
+    pub jerk_form: String,
+    /// How long paths are divided, as on the command line.
+    pub windows: String,
     /// Time to plan and certify [s].
     pub seconds: f64,
     /// Largest resident memory [MiB].

@@ -83,7 +83,7 @@ pub(super) fn operations(report: &Report) -> Markup {
                     } }
                     tbody { @for o in &report.operations {
                         tr {
-                            td.wide { @if o.name.is_empty() { "before the first remark" } @else { (o.name) } }
+                            td.wide { @if !o.name.is_empty() { (o.name) } @else if report.way_points.is_some() { "way-points" } @else { "before the first remark" } }
                             td { (o.line.max(1)) }
                             @for seconds in [o.feed_s, o.rapid_s, o.dwell_s] {
                                 td.n { (if seconds > 0.0 { duration(seconds) } else { NOTHING.into() }) }
@@ -250,6 +250,9 @@ pub(super) fn facts(report: &Report) -> Markup {
                 table.facts { tbody {
                     (fact("Solver", &p.solver))
                     (fact("Iterations", &count(p.iterations)))
+                    @if let Some(gap) = p.gap { (fact("Left by the solver at most", &format!("{:.4} %", 100.0 * gap))) }
+                    (fact("Jerk limit", &p.jerk_form))
+                    (fact("Windows", &p.windows))
                     (fact("Planned and certified in", &duration(p.seconds)))
                     @if let Some(m) = p.peak_memory_mib { (fact("Peak memory", &format!("{m:.0} MiB"))) }
                     (fact("Set-points", if report.simulation.is_some() { "simulated drives" } else { "not played" }))

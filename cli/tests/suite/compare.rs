@@ -27,7 +27,7 @@ fn methods_on_a_circle_come_out_in_their_order() {
     let told = tell(home.path(), "compare", &file, &["--spline", "periodic"]);
     let names: Vec<&str> =
         told["methods"].as_array().unwrap().iter().map(|m| m["method"].as_str().unwrap()).collect();
-    let all = "whole zhao overlap constant-feed pseudo-jerk no-jerk sweep clarabel collocation";
+    let all = "whole zhao overlap fine constant-feed pseudo-jerk no-jerk sweep clarabel collocation";
     assert_eq!(names, all.split(' ').collect::<Vec<_>>());
     let time = |name: &str| number(method(&told, name), "traverse_time_s");
     let whole = time("whole");
@@ -36,6 +36,8 @@ fn methods_on_a_circle_come_out_in_their_order() {
     for name in ["zhao", "overlap", "clarabel"] {
         assert!((time(name) / whole - 1.0).abs() < 2e-3, "{name}: {}", time(name));
     }
+    // What the usual number of spans costs.
+    assert!(time("fine") < whole * 1.0001 && time("fine") > whole * 0.998, "{}", time("fine") / whole);
     assert!(time("no-jerk") < whole && time("pseudo-jerk") > whole && time("collocation") < whole * 1.001);
     assert!((time("sweep") / time("no-jerk") - 1.0).abs() < 0.01);
 
@@ -68,16 +70,18 @@ fn methods_are_chosen_and_a_program_compares_its_feed_moves() {
     let file = home.path().join("part.ngc");
     fs::write(&file, "G21 G90 G94 G64 P0.02\nG0 X50\nG1 X90 F1200\nY20\nG0 X0\nG4 P0.2\nG1 X20 F6000\nM30\n")
         .unwrap();
-    let words = ["--methods", "overlap,whole,overlap", "--threads", "2"];
+    let words = ["--methods", "overlap,whole,fine,overlap", "--threads", "2"];
     let told = tell(home.path(), "compare", &file, &words);
     let names: Vec<&str> =
         told["methods"].as_array().unwrap().iter().map(|m| m["method"].as_str().unwrap()).collect();
-    assert_eq!(names, ["overlap", "whole"]);
+    assert_eq!(names, ["overlap", "whole", "fine"]);
     assert_eq!((&told["job_kind"], &told["sections"]), (&"program".into(), &2.into()));
     // 60 mm at 20 mm/s, 20 mm at 100 mm/s: neither rapids nor the wait count.
     let whole = method(&told, "whole");
     let time = number(whole, "traverse_time_s");
     assert!(time > 60.0 / 20.0 + 20.0 / 100.0 && time < 3.8, "{time}");
+    let fine = method(&told, "fine");
+    assert!(number(fine, "traverse_time_s") < time && number(fine, "spans") > 2.0 * number(whole, "spans"));
     assert!(number(whole, "lost_s") > 0.0 && number(whole, "feed_ratio") <= 1.000_001);
     assert!((number(&told, "feed_length_mm") - 80.0).abs() < 0.1);
     let apart = tell(home.path(), "compare", &file, &["--methods", "constant-feed"]);

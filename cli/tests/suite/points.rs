@@ -152,3 +152,19 @@ fn jerk_forms_and_limits_are_told_and_ordered() {
     let gap = number(&plan(&[]), "gap_estimate");
     assert!((0.0..1e-3).contains(&gap), "{gap}");
 }
+
+#[test]
+fn a_raster_that_turns_back_at_every_row_is_planned_and_proven() {
+    let home = tempfile::tempdir().unwrap();
+    let file = home.path().join("tooth.csv");
+    let words =
+        ["feedspline", "sample", "tooth", "--rows", "30", "--points", "40", "-o", file.to_str().unwrap()];
+    let (mut said, mut err) = (Vec::new(), Vec::new());
+    assert_eq!(cli::status(words.map(Into::into).to_vec(), &Local, &mut said, &mut err), 0);
+    let told = tell(home.path(), "plan", &file, &[]);
+    assert_eq!((&told["way_points"]["count"], &told["certificate"]["holds"]), (&1200.into(), &true.into()));
+    let verified = tell(home.path(), "verify", &home.path().join("out/tooth.feed"), &[]);
+    assert_eq!(verified["certificate"], told["certificate"]);
+    // 30 rows of 12 mm along x at least, and the way up and down the tooth.
+    assert!(number(&told, "feed_length_mm") > 30.0 * 11.7);
+}

@@ -371,6 +371,9 @@ fn finish(axes: Vec<Axis>, recorder: Recorder, cycle_s: f64, motion_s: f64) -> R
         planning: Planning {
             solver: "interior-point".into(),
             iterations: 187,
+            gap: Some(7e-6),
+            jerk_form: "true".into(),
+            windows: "overlap".into(),
             seconds: 0.412,
             peak_memory_mib: Some(48.0),
         },

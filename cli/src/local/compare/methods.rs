@@ -22,6 +22,9 @@ const RUNS: u32 = 3;
 /// No further run begins after this time [s].
 const ENOUGH_S: f64 = 1.0;
 
+/// Spans per ramp of the fine plan, over the usual.
+const FINER: f64 = 8.0;
+
 /// What a method finds.
 pub(super) struct Found {
     /// Shortest run [s].
@@ -62,6 +65,7 @@ pub(super) fn stage(method: Method) -> &'static str {
         Method::Whole => "whole",
         Method::Zhao => "zhao",
         Method::Overlap => "overlap",
+        Method::Fine => "fine",
         Method::ConstantFeed => "constant feed",
         Method::PseudoJerk => "pseudo-jerk",
         Method::NoJerk => "no jerk",
@@ -108,6 +112,7 @@ fn settings(method: Method) -> Settings {
         Method::Whole | Method::NoJerk | Method::Sweep => whole,
         Method::Zhao => Settings { windows: Windows::Zhao, ..whole },
         Method::Overlap | Method::ConstantFeed => Settings { windows: Windows::Overlap, ..whole },
+        Method::Fine => Settings { spans_per_ramp: FINER * whole.spans_per_ramp, ..whole },
         Method::PseudoJerk => Settings { jerk: JerkForm::Pseudo, ..whole },
         Method::Clarabel => Settings { solver: Solver::Clarabel, ..whole },
         Method::Collocation => Settings { rows: RowForm::Collocation, ..whole },

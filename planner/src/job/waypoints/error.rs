@@ -27,6 +27,7 @@ struct Cell {
     name: String,
     text: String,
     line: u32,
+    column: u32,
     offset: usize,
     length: usize,
 }
@@ -175,7 +176,8 @@ impl WayPointError {
             (span.start.min(text.len()), span.end.clamp(span.start, text.len().max(span.start)));
         let offset = shown(&text[..start]).len();
         let length = shown(&text[start..end.max(start).min(text.len())]).len();
-        let cell = Cell { name: name.to_owned(), text: shown(text), line, offset, length };
+        let column = u32::try_from(start + 1).unwrap_or(u32::MAX);
+        let cell = Cell { name: name.to_owned(), text: shown(text), line, column, offset, length };
         Self(Box::new(Details { name: name.to_owned(), kind, line: Some(line), cell: Some(cell) }))
     }
 
@@ -189,15 +191,9 @@ impl WayPointError {
         self.0.line
     }
 
-    /// Column in the line, in characters from 1, if the error is about one field.
+    /// Column in the line, in bytes from 1, if the error is about one field.
     pub fn column(&self) -> Option<u32> {
-        self.0.cell.as_ref().map(Cell::column)
-    }
-}
-
-impl Cell {
-    fn column(&self) -> u32 {
-        u32::try_from(self.text[..self.offset].chars().count() + 1).unwrap_or(u32::MAX)
+        self.0.cell.as_ref().map(|cell| cell.column)
     }
 }
 
@@ -223,7 +219,7 @@ impl fmt::Display for WayPointError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Details { name, kind, line, cell } = &*self.0;
         match (line, cell) {
-            (Some(line), Some(cell)) => write!(f, "{name}:{line}:{}: {kind}", cell.column()),
+            (Some(line), Some(cell)) => write!(f, "{name}:{line}:{}: {kind}", cell.column),
             (Some(line), None) => write!(f, "{name}:{line}: {kind}"),
             _ => write!(f, "{name}: {kind}"),
         }
