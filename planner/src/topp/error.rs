@@ -98,6 +98,14 @@ pub enum PlanError {
     /// No axis moves.
     #[error("no axis moves on the path: leave the move out")]
     NothingMoves,
+    /// No axis moves along a span of the path.
+    #[error("no axis moves on the path from u = {from} to u = {to}: take this part out, or stop there")]
+    StandsStill {
+        /// Start of the span.
+        from: f64,
+        /// Its end.
+        to: f64,
+    },
     /// A setting is outside its range.
     #[error("the planner setting {name} is {value}; it must be positive and finite")]
     Setting {
@@ -168,6 +176,7 @@ impl PlanError {
             | PlanError::Slow { u, .. }
             | PlanError::Uneven { u, .. }
             | PlanError::Resolution { u, .. } => Some(u),
+            PlanError::StandsStill { from, .. } => Some(from),
             PlanError::AxisCount { .. }
             | PlanError::LimitCount { .. }
             | PlanError::Limit { .. }
@@ -240,6 +249,11 @@ fn validate_path(problem: &Problem) -> Result<(), PlanError> {
     }
     if path.axes.iter().all(|a| a.controls.windows(2).all(|w| w[0] == w[1])) {
         return Err(PlanError::NothingMoves);
+    }
+    let still = |g: &usize| path.axes.iter().all(|a| a.controls[*g..g + 4].windows(2).all(|w| w[0] == w[1]));
+    if let Some(g) = (0..path.spans()).find(still) {
+        let [from, to] = [g, g + 1].map(|k| path.breaks[k] as f64 * path.step);
+        return Err(PlanError::StandsStill { from, to });
     }
     Ok(())
 }
