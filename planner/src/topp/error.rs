@@ -3,6 +3,7 @@
 use super::problem::Problem;
 use crate::geometry::section::SpeedCap;
 use crate::job::machine::MAX_AXES;
+use crate::tolerances::{LARGEST_LIMIT, SMALLEST_LIMIT};
 
 /// A limit of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +43,7 @@ pub enum PlanError {
         /// Axes of the path.
         axes: usize,
     },
-    /// A limit is zero, negative or not a number.
+    /// A limit is zero or all but zero, negative or not a number.
     #[error("the {kind} limit of axis {axis} is {value}; it must be positive{}", finite_hint(.kind))]
     Limit {
         /// Axis, from 0.
@@ -52,7 +53,7 @@ pub enum PlanError {
         /// Its value.
         value: f64,
     },
-    /// A speed cap is zero, negative or not a number.
+    /// A speed cap is zero or all but zero, negative, not a number, or absurdly large.
     #[error("the speed cap up to u = {u} is {value}; a cap must be positive, or absent")]
     Cap {
         /// End of the capped part.
@@ -210,11 +211,11 @@ pub(super) fn validate(problem: &Problem) -> Result<(), PlanError> {
     for (axis, l) in problem.limits.iter().enumerate() {
         let finite = [(LimitKind::Velocity, l.velocity), (LimitKind::Acceleration, l.acceleration)];
         for (kind, value) in finite {
-            if !(value > 0.0 && value.is_finite()) {
+            if !(value >= SMALLEST_LIMIT && value.is_finite()) {
                 return Err(PlanError::Limit { axis, kind, value });
             }
         }
-        if l.jerk.is_nan() || l.jerk <= 0.0 {
+        if l.jerk.is_nan() || l.jerk < SMALLEST_LIMIT {
             return Err(PlanError::Limit { axis, kind: LimitKind::Jerk, value: l.jerk });
         }
     }
@@ -267,7 +268,8 @@ fn validate_caps(problem: &Problem) -> Result<(), PlanError> {
             SpeedCap::Tangential { speed, .. } => speed,
             SpeedCap::Rate(rate) => rate,
         };
-        if value.is_nan() || value <= 0.0 {
+        let sound = (SMALLEST_LIMIT..=LARGEST_LIMIT).contains(&value) || value == f64::INFINITY;
+        if !sound {
             return Err(PlanError::Cap { u: cap.until as f64 * path.step, value });
         }
         if cap.until <= from {

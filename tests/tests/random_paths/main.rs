@@ -57,8 +57,18 @@ fn check(case: &Case) -> Result<(), Finding> {
     let problem = Problem { path, limits, caps, control_tick_s: *tick_s };
     let begin = Instant::now();
     if std::env::var("SHOW").is_ok() {
-        println!("SHOW {} {} {} {:?} {:?} tick {tick_s} sweep {}", path.spans(), path.step, path.length(), limits, caps, swept_time(path, limits, caps, 64));
-        for a in &path.axes { println!("AXIS {:?}", a.controls.iter().take(12).map(|&c| c as f64 * a.lsb).collect::<Vec<_>>()); }
+        println!(
+            "SHOW {} {} {} {:?} {:?} tick {tick_s} sweep {}",
+            path.spans(),
+            path.step,
+            path.length(),
+            limits,
+            caps,
+            swept_time(path, limits, caps, 64)
+        );
+        for a in &path.axes {
+            println!("AXIS {:?}", a.controls.iter().take(12).map(|&c| c as f64 * a.lsb).collect::<Vec<_>>());
+        }
     }
     let plan = match plan(&problem, &Settings::default()) {
         Ok(plan) => plan,
@@ -67,15 +77,29 @@ fn check(case: &Case) -> Result<(), Finding> {
     if std::env::var("TELL").is_ok() {
         println!(
             "{:?} plan s {} spans {} geo {} seconds {} iterations {} tick {} limits {:?} length {} caps {}",
-            case.shape, begin.elapsed().as_secs_f64(), plan.table.spans(), path.spans(), plan.table.duration(), plan.iterations, tick_s, limits, path.length(), caps.len()
+            case.shape,
+            begin.elapsed().as_secs_f64(),
+            plan.table.spans(),
+            path.spans(),
+            plan.table.duration(),
+            plan.iterations,
+            tick_s,
+            limits,
+            path.length(),
+            caps.len()
         );
     }
     let proof = certify(&plan.table, limits, caps);
+    if std::env::var("TELL").is_ok() {
+        println!(
+            "proven {} {:?} {:?}",
+            begin.elapsed().as_secs_f64(),
+            proof,
+            largest_ratios(&plan.table, limits, caps, 50)
+        );
+    }
     if !proof.holds {
         return found("certificate", format!("{proof:?}"));
-    }
-    if std::env::var("TELL").is_ok() {
-        println!("proven {}", begin.elapsed().as_secs_f64());
     }
     let sampled = largest_ratios(&plan.table, limits, caps, SAMPLES);
     let pairs = [
