@@ -19,8 +19,8 @@ const FEWEST_SPANS: f64 = 32.0;
 const FEWEST_ALL_JERK: f64 = 48.0;
 /// Share of the wanted spans that short codes have to allow.
 const FEWER: f64 = 0.7;
-/// Most that a span beside a divided one may be longer.
-const MOST_UNEVEN: f64 = 4.0;
+/// Most that a span may be longer than the one beside it.
+const MOST_UNEVEN: u64 = 4;
 /// Longest step of a table [grid steps].
 const LONGEST_STEP: f64 = (1u64 << 31) as f64;
 /// Most spans of one table: beyond, memory would not do.
@@ -63,7 +63,7 @@ pub(super) fn place(
     while knots.len() <= MIN_SPANS {
         bisect_longest_inner(&mut knots);
     }
-    let mut layout = Layout::new(path, knots);
+    let mut layout = Layout::new(path, graded(&knots));
     let slow = 0.5 * estimate.ramp_s;
     for i in 1..layout.spans() - 1 {
         let time = estimate.time(layout.knots[i], layout.knots[i + 1]);
@@ -73,38 +73,56 @@ pub(super) fn place(
     Ok((layout, largest_code))
 }
 
-/// Divides each span `i` into `parts[i]` parts of about equal length; the error is a span too short for that.
-///
-/// Neighbours of divided spans are divided too where they would be left much longer: a spline with knots at very
-/// uneven distances bends too much beside the short ones.
+/// Divides each span `i` into `parts[i]` parts of about equal length, and grades what is left; the error is a span too
+/// short for that.
 pub(super) fn refine(path: &GridPath, layout: &Layout, parts: &[u32]) -> Result<Layout, usize> {
-    let mut parts = parts.to_vec();
-    let last = layout.spans() - 1;
-    let mut grade = |i: usize, from: usize| {
-        let part = |i: usize, parts: &[u32]| layout.h[i] / f64::from(parts[i]);
-        while i != 0 && i != last && part(i, &parts) > MOST_UNEVEN * part(from, &parts) {
-            parts[i] *= 2;
-        }
-    };
-    (1..=last).for_each(|i| grade(i, i - 1));
-    (0..last).rev().for_each(|i| grade(i, i + 1));
     let mut knots = vec![0];
-    let mut cells = Vec::with_capacity(layout.spans());
     for (i, &parts) in parts.iter().enumerate() {
         let (a, b) = (layout.knots[i], layout.knots[i + 1]);
         let k = u64::from(parts.max(1));
         if b - a < k {
             return Err(i);
         }
-        for j in 1..=k {
-            knots.push(a + ((b - a) as u128 * u128::from(j) / u128::from(k)) as u64);
-            cells.push(layout.cells[i]);
-        }
+        knots.extend((1..=k).map(|j| a + ((b - a) as u128 * u128::from(j) / u128::from(k)) as u64));
     }
-    let mut refined = Layout::new(path, knots);
-    refined.cells = cells;
+    let mut refined = Layout::new(path, graded(&knots));
+    let mut i = 0;
+    for k in 0..refined.spans() {
+        while layout.knots[i + 1] <= refined.knots[k] {
+            i += 1;
+        }
+        refined.cells[k] = layout.cells[i];
+    }
     grade_cells(&mut refined);
     Ok(refined)
+}
+
+/// Adds knots until no inner span is much longer than its neighbours: a spline with knots at very uneven distances
+/// bends too much beside the short ones.
+fn graded(knots: &[u64]) -> Vec<u64> {
+    let forwards = graded_onwards(knots);
+    let end = knots[knots.len() - 1];
+    let mirrored: Vec<u64> = forwards.iter().rev().map(|k| end - k).collect();
+    graded_onwards(&mirrored).iter().rev().map(|k| end - k).collect()
+}
+
+/// As [`graded`], against the neighbour before only.
+fn graded_onwards(knots: &[u64]) -> Vec<u64> {
+    let last = knots.len() - 1;
+    let mut out = vec![knots[0], knots[1]];
+    for (i, &end) in knots.iter().enumerate().skip(2) {
+        while i < last {
+            let (at, before) = (out[out.len() - 1], out[out.len() - 2]);
+            let most = MOST_UNEVEN.saturating_mul(at - before);
+            if end - at <= most {
+                break;
+            }
+            // No sliver at the end.
+            out.push(at + most.min((end - at) / 2));
+        }
+        out.push(end);
+    }
+    out
 }
 
 fn grade_cells(layout: &mut Layout) {
