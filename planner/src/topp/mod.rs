@@ -274,7 +274,7 @@ impl Attempt<'_> {
             let plan = Plan { table, binding: findings.binding, iterations: 0, gap_s: f64::INFINITY };
             (keeps && check::format(layout, &plan.table).is_none()).then_some(plan)
         };
-        let mut slow = start::profile(&source).x;
+        let mut slow = start::profile(&source);
         let slowest = (0..SCALINGS).find_map(|_| {
             let plan = sound(&slow);
             if plan.is_none() {
@@ -329,21 +329,22 @@ impl Attempt<'_> {
     /// Control values of minimum time, and how far above the optimum they may be [s]; `None` where rounding alone
     /// would break a limit at any speed.
     fn optimise(&self, source: &RowSource, half: &[f64], iterations: &mut u64) -> Option<(Vec<f64>, f64)> {
-        let start::Start { mut x, bends } = start::profile(source);
-        let source = &RowSource { bends, ..source.clone() };
         let gap = self.settings.relative_gap;
-        match self.settings.solver {
-            Solver::InteriorPoint => {
-                let total = window::solve(source, &mut x, half, gap, self.whole)?;
-                *iterations += total.iterations;
-                Some((x, total.gap / source.unit.sqrt()))
-            }
-            Solver::Clarabel => {
-                let answer = clarabel::solve(source, &x, half, gap)?;
-                *iterations += answer.iterations;
-                Some((answer.x, answer.gap / source.unit.sqrt()))
-            }
-        }
+        start::candidates(source).into_iter().find_map(|start::Start { mut x, bends }| {
+            let source = &RowSource { bends, ..source.clone() };
+            let (x, gap, count) = match self.settings.solver {
+                Solver::InteriorPoint => {
+                    let total = window::solve(source, &mut x, half, gap, self.whole)?;
+                    (x, total.gap, total.iterations)
+                }
+                Solver::Clarabel => {
+                    let answer = clarabel::solve(source, &x, half, gap)?;
+                    (answer.x, answer.gap, answer.iterations)
+                }
+            };
+            *iterations += count;
+            Some((x, gap / source.unit.sqrt()))
+        })
     }
 }
 
