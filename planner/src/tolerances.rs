@@ -92,3 +92,8 @@ pub const LSB_NOISE: f64 = 1e-3;
 /// Below this |dr/du| all along a geometry span the path counts as standing still: the square root of q is
 /// coded with 16 bits, so speeds further apart do not fit one table.
 pub const STALL_SLOPE: f64 = 1e-4;
+
+/// Largest limit that is taken at its word; larger finite ones are cut to it, which is the strict side.
+pub const LARGEST_LIMIT: f64 = 1e15;
+/// Smaller limits, and what is not a number, admit no motion.
+pub const SMALLEST_LIMIT: f64 = 1e-15;

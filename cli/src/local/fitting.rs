@@ -107,7 +107,7 @@ fn remedy(fault: &PlanError) -> &'static str {
         PlanError::Limit { .. } | PlanError::LimitCount { .. } | PlanError::AxisCount { .. } => {
             "Check the axes and their limits in the machine file."
         }
-        PlanError::TooShort { .. } | PlanError::NothingMoves => {
+        PlanError::TooShort { .. } | PlanError::NothingMoves | PlanError::StandsStill { .. } => {
             "Leave this move out, or check the counts per unit in the machine file: \
              it is too short for the drives to tell."
         }

@@ -14,11 +14,7 @@ use super::bernstein::{
 use super::hodograph::{Hodograph, Rate};
 use crate::geometry::section::SpeedCap;
 use crate::job::machine::{AxisLimits, MAX_AXES};
-
-/// Largest limit that is taken at its word; larger finite ones are cut to it, which is the strict side.
-const LARGEST_LIMIT: f64 = 1e15;
-/// Smaller limits, and what is not a number, admit no motion.
-const SMALLEST_LIMIT: f64 = 1e-15;
+use crate::tolerances::{LARGEST_LIMIT, SMALLEST_LIMIT};
 
 /// The peaks of every axis, and of the feed.
 #[derive(Clone, Copy, Debug)]

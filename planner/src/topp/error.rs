@@ -3,6 +3,7 @@
 use super::problem::Problem;
 use crate::geometry::section::SpeedCap;
 use crate::job::machine::MAX_AXES;
+use crate::tolerances::{LARGEST_LIMIT, SMALLEST_LIMIT};
 
 /// A limit of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +43,7 @@ pub enum PlanError {
         /// Axes of the path.
         axes: usize,
     },
-    /// A limit is zero, negative or not a number.
+    /// A limit is zero or all but zero, negative or not a number.
     #[error("the {kind} limit of axis {axis} is {value}; it must be positive{}", finite_hint(.kind))]
     Limit {
         /// Axis, from 0.
@@ -52,7 +53,7 @@ pub enum PlanError {
         /// Its value.
         value: f64,
     },
-    /// A speed cap is zero, negative or not a number.
+    /// A speed cap is zero or all but zero, negative, not a number, or absurdly large.
     #[error("the speed cap up to u = {u} is {value}; a cap must be positive, or absent")]
     Cap {
         /// End of the capped part.
@@ -98,6 +99,14 @@ pub enum PlanError {
     /// No axis moves.
     #[error("no axis moves on the path: leave the move out")]
     NothingMoves,
+    /// No axis moves along a span of the path.
+    #[error("no axis moves on the path from u = {from} to u = {to}: take this part out, or stop there")]
+    StandsStill {
+        /// Start of the span.
+        from: f64,
+        /// Its end.
+        to: f64,
+    },
     /// A setting is outside its range.
     #[error("the planner setting {name} is {value}; it must be positive and finite")]
     Setting {
@@ -168,6 +177,7 @@ impl PlanError {
             | PlanError::Slow { u, .. }
             | PlanError::Uneven { u, .. }
             | PlanError::Resolution { u, .. } => Some(u),
+            PlanError::StandsStill { from, .. } => Some(from),
             PlanError::AxisCount { .. }
             | PlanError::LimitCount { .. }
             | PlanError::Limit { .. }
@@ -201,11 +211,11 @@ pub(super) fn validate(problem: &Problem) -> Result<(), PlanError> {
     for (axis, l) in problem.limits.iter().enumerate() {
         let finite = [(LimitKind::Velocity, l.velocity), (LimitKind::Acceleration, l.acceleration)];
         for (kind, value) in finite {
-            if !(value > 0.0 && value.is_finite()) {
+            if !(value >= SMALLEST_LIMIT && value.is_finite()) {
                 return Err(PlanError::Limit { axis, kind, value });
             }
         }
-        if l.jerk.is_nan() || l.jerk <= 0.0 {
+        if l.jerk.is_nan() || l.jerk < SMALLEST_LIMIT {
             return Err(PlanError::Limit { axis, kind: LimitKind::Jerk, value: l.jerk });
         }
     }
@@ -241,6 +251,11 @@ fn validate_path(problem: &Problem) -> Result<(), PlanError> {
     if path.axes.iter().all(|a| a.controls.windows(2).all(|w| w[0] == w[1])) {
         return Err(PlanError::NothingMoves);
     }
+    let still = |g: &usize| path.axes.iter().all(|a| a.controls[*g..g + 4].windows(2).all(|w| w[0] == w[1]));
+    if let Some(g) = (0..path.spans()).find(still) {
+        let [from, to] = [g, g + 1].map(|k| path.breaks[k] as f64 * path.step);
+        return Err(PlanError::StandsStill { from, to });
+    }
     Ok(())
 }
 
@@ -253,7 +268,8 @@ fn validate_caps(problem: &Problem) -> Result<(), PlanError> {
             SpeedCap::Tangential { speed, .. } => speed,
             SpeedCap::Rate(rate) => rate,
         };
-        if value.is_nan() || value <= 0.0 {
+        let sound = (SMALLEST_LIMIT..=LARGEST_LIMIT).contains(&value) || value == f64::INFINITY;
+        if !sound {
             return Err(PlanError::Cap { u: cap.until as f64 * path.step, value });
         }
         if cap.until <= from {

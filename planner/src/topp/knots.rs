@@ -17,8 +17,10 @@ const LONGEST_S: f64 = 0.4;
 /// below one per cent.
 const FEWEST_SPANS: f64 = 32.0;
 const FEWEST_ALL_JERK: f64 = 48.0;
-/// Most that a span beside a divided one may be longer.
-const MOST_UNEVEN: f64 = 4.0;
+/// Share of the wanted spans that short codes have to allow.
+const FEWER: f64 = 0.7;
+/// Most that a span may be longer than the one beside it.
+const MOST_UNEVEN: u64 = 4;
 /// Longest step of a table [grid steps].
 const LONGEST_STEP: f64 = (1u64 << 31) as f64;
 /// Most spans of one table: beyond, memory would not do.
@@ -27,8 +29,12 @@ const MOST_SPANS: f64 = 2e7;
 const REST_SPANS: usize = 4;
 const REST_CELLS: u8 = 4;
 
-/// Places the knots of a valid problem by the speed the sweep allows.
-pub(super) fn place(problem: &Problem, settings: &Settings, sweep: &Sweep) -> Result<Layout, PlanError> {
+/// Places the knots of a valid problem by the speed the sweep allows, and chooses the largest code.
+pub(super) fn place(
+    problem: &Problem,
+    settings: &Settings,
+    sweep: &Sweep,
+) -> Result<(Layout, f64), PlanError> {
     let path = problem.path;
     let total = path.grid_length();
     if total < MIN_SPANS as u64 {
@@ -41,58 +47,82 @@ pub(super) fn place(problem: &Problem, settings: &Settings, sweep: &Sweep) -> Re
         return Err(PlanError::TooLong { seconds, spans });
     }
     let hard = hard_breaks(problem, &estimate);
+    // Where short codes would have spans so long that many have to be left out, codes are long.
+    let inner = hard[1..hard.len() - 1].windows(2);
+    let count =
+        |code: f64| inner.clone().map(|pair| estimate.pieces(pair[0], pair[1], code)).sum::<u64>() as f64;
+    let enough = count(rounding::SHORT_CODE) >= FEWER * count(f64::INFINITY);
+    let largest_code = if enough { rounding::SHORT_CODE } else { rounding::LONG_CODE };
     let mut knots = vec![0];
     for (pair, index) in hard.windows(2).zip(0..) {
         let (a, b) = (pair[0], pair[1]);
         let rest = index == 0 || index + 2 == hard.len();
-        let pieces = if rest { 1 } else { estimate.pieces(a, b) };
+        let pieces = if rest { 1 } else { estimate.pieces(a, b, largest_code) };
         estimate.divide(a, b, pieces, &mut knots);
     }
     while knots.len() <= MIN_SPANS {
         bisect_longest_inner(&mut knots);
     }
-    let mut layout = Layout::new(path, knots);
+    let mut layout = Layout::new(path, graded(&knots));
     let slow = 0.5 * estimate.ramp_s;
     for i in 1..layout.spans() - 1 {
         let time = estimate.time(layout.knots[i], layout.knots[i + 1]);
         layout.cells[i] = if time > slow { 2 } else { 1 };
     }
     grade_cells(&mut layout);
-    Ok(layout)
+    Ok((layout, largest_code))
 }
 
-/// Divides each span `i` into `parts[i]` parts of about equal length; the error is a span too short for that.
-///
-/// Neighbours of divided spans are divided too where they would be left much longer: a spline with knots at very
-/// uneven distances bends too much beside the short ones.
+/// Divides each span `i` into `parts[i]` parts of about equal length, and grades what is left; the error is a span too
+/// short for that.
 pub(super) fn refine(path: &GridPath, layout: &Layout, parts: &[u32]) -> Result<Layout, usize> {
-    let mut parts = parts.to_vec();
-    let last = layout.spans() - 1;
-    let mut grade = |i: usize, from: usize| {
-        let part = |i: usize, parts: &[u32]| layout.h[i] / f64::from(parts[i]);
-        while i != 0 && i != last && part(i, &parts) > MOST_UNEVEN * part(from, &parts) {
-            parts[i] *= 2;
-        }
-    };
-    (1..=last).for_each(|i| grade(i, i - 1));
-    (0..last).rev().for_each(|i| grade(i, i + 1));
     let mut knots = vec![0];
-    let mut cells = Vec::with_capacity(layout.spans());
     for (i, &parts) in parts.iter().enumerate() {
         let (a, b) = (layout.knots[i], layout.knots[i + 1]);
         let k = u64::from(parts.max(1));
         if b - a < k {
             return Err(i);
         }
-        for j in 1..=k {
-            knots.push(a + ((b - a) as u128 * u128::from(j) / u128::from(k)) as u64);
-            cells.push(layout.cells[i]);
-        }
+        knots.extend((1..=k).map(|j| a + ((b - a) as u128 * u128::from(j) / u128::from(k)) as u64));
     }
-    let mut refined = Layout::new(path, knots);
-    refined.cells = cells;
+    let mut refined = Layout::new(path, graded(&knots));
+    let mut i = 0;
+    for k in 0..refined.spans() {
+        while layout.knots[i + 1] <= refined.knots[k] {
+            i += 1;
+        }
+        refined.cells[k] = layout.cells[i];
+    }
     grade_cells(&mut refined);
     Ok(refined)
+}
+
+/// Adds knots until no inner span is much longer than its neighbours: a spline with knots at very uneven distances
+/// bends too much beside the short ones.
+fn graded(knots: &[u64]) -> Vec<u64> {
+    let forwards = graded_onwards(knots);
+    let end = knots[knots.len() - 1];
+    let mirrored: Vec<u64> = forwards.iter().rev().map(|k| end - k).collect();
+    graded_onwards(&mirrored).iter().rev().map(|k| end - k).collect()
+}
+
+/// As [`graded`], against the neighbour before only.
+fn graded_onwards(knots: &[u64]) -> Vec<u64> {
+    let last = knots.len() - 1;
+    let mut out = vec![knots[0], knots[1]];
+    for (i, &end) in knots.iter().enumerate().skip(2) {
+        while i < last {
+            let (at, before) = (out[out.len() - 1], out[out.len() - 2]);
+            let most = MOST_UNEVEN.saturating_mul(at - before);
+            if end - at <= most {
+                break;
+            }
+            // No sliver at the end.
+            out.push(at + most.min((end - at) / 2));
+        }
+        out.push(end);
+    }
+    out
 }
 
 fn grade_cells(layout: &mut Layout) {
@@ -234,7 +264,7 @@ impl<'a> Estimate<'a> {
 
     /// Shortest time a span in the geometry span at grid step `a` should take: clear of the control tick, and long
     /// enough for the rounding of q to stay a small share of the limits.
-    fn shortest_s(&self, a: u64) -> f64 {
+    fn shortest_s(&self, a: u64, largest_code: f64) -> f64 {
         const CLEAR: f64 = 1.3;
         const ROUNDING_SHARE: f64 = 0.006;
         let path = self.path;
@@ -243,8 +273,7 @@ impl<'a> Estimate<'a> {
         for (axis, l) in self.limits.iter().enumerate() {
             let piece = path.piece(axis, g);
             let slope = Derivatives::of(&piece, 0.0, piece.length).first_max();
-            noise =
-                noise.max(rounding::shortest_s(slope, l, self.top / rounding::SHORT_CODE, ROUNDING_SHARE));
+            noise = noise.max(rounding::shortest_s(slope, l, self.top / largest_code, ROUNDING_SHARE));
         }
         noise.max(CLEAR * self.tick)
     }
@@ -261,9 +290,9 @@ impl<'a> Estimate<'a> {
     }
 
     /// Pieces for the part [a, b] of one geometry span.
-    fn pieces(&self, a: u64, b: u64) -> u64 {
+    fn pieces(&self, a: u64, b: u64, largest_code: f64) -> u64 {
         let wanted = (self.at(&self.count, b) - self.at(&self.count, a) - 1e-6).ceil().max(1.0);
-        let most = self.time(a, b) / self.shortest_s(a);
+        let most = self.time(a, b) / self.shortest_s(a, largest_code);
         (wanted.min(most.max(1.0)) as u64).clamp(1, b - a)
     }
 
@@ -332,15 +361,24 @@ fn rest_lengths(problem: &Problem, sweep: &Sweep, ramp_s: &[f64]) -> ([f64; 2], 
     let end_station = sweep.stations.len() - 1;
     for (end, (g, k, far)) in ends.iter_mut().zip([(0, 0, false), (last, end_station, true)]) {
         let axes = pieces.at(g);
-        let x = if far { axes[0].length } else { 0.0 };
-        let [acceleration, jerk] = along(axes, x, problem.limits);
-        let mut length = path.length() / 12.0;
-        if acceleration.is_finite() {
+        let whole = axes[0].length;
+        let limits_at =
+            |from_end: f64| along(axes, if far { whole - from_end } else { from_end }, problem.limits);
+        let at_end = limits_at(0.0);
+        let mut length = whole.min(path.length() / 12.0);
+        let jerk = loop {
+            // The slope at an end may vanish: the one at the joint counts too.
+            let at_joint = limits_at(length);
+            let [acceleration, jerk] = [0, 1].map(|k| at_end[k].min(at_joint[k]));
             // Acceleration saturates exactly at the joint: J T^3/6 with T = A/J along the path; where jerk hardly
             // matters, T is two ticks or a small share of the ramp.
             let t = (acceleration / jerk).max(0.05 * ramp_s[k]).max(2.0 * problem.control_tick_s);
-            length = length.min(acceleration / t * t.min(LONGEST_S).powi(3) / 6.0);
-        }
+            let needed = acceleration / t * t.min(LONGEST_S).powi(3) / 6.0;
+            if !(needed < length) || length < path.step {
+                break jerk;
+            }
+            length = needed.max(0.5 * length);
+        };
         let q = sweep.constant[k];
         // A cap may be reached before acceleration saturates: half of the speed is then gained at full jerk.
         let half_ramp = q.sqrt() * (q.sqrt() / jerk).sqrt() / 6.0;

@@ -26,6 +26,7 @@ pub use error::{LimitKind, PathFault, PlanError};
 
 use crate::feed::table::FeedTable;
 use crate::job::machine::AxisLimits;
+use crate::tolerances::LARGEST_LIMIT;
 use layout::{Derivatives, Layout, Pieces, strictest};
 use problem::{Plan, Problem, Settings, Solver};
 use rows::RowSource;
@@ -63,12 +64,10 @@ fn plan_whole_up_to(whole: usize, problem: &Problem, settings: &Settings) -> Res
     let limits = slowed(problem);
     let problem = &Problem { limits: &limits, ..*problem };
     let sweep = Sweep::new(problem);
-    let placed = knots::place(problem, settings, &sweep)?;
+    let (placed, mut largest_code) = knots::place(problem, settings, &sweep)?;
     let mut layout = placed.clone();
     let attempt = Attempt { whole, problem, settings, sweep: &sweep };
     let mut iterations = 0;
-    // Spans that had to be divided are short: finer codes keep rounding from slowing them.
-    let mut largest_code = rounding::SHORT_CODE;
     let mut fault = None;
     for _ in 0..MOST_SOLUTIONS {
         layout = match attempt.solve(&layout, largest_code, &mut iterations)? {
@@ -79,13 +78,14 @@ fn plan_whole_up_to(whole: usize, problem: &Problem, settings: &Settings) -> Res
                 break;
             }
         };
+        // Spans that had to be divided are short: finer codes keep rounding from slowing them.
         largest_code = rounding::LONG_CODE;
     }
     let uneven = PlanError::Uneven { span: 0, u: 0.0 };
     attempt.gentle(&placed, &mut iterations).ok_or(fault.unwrap_or(uneven))
 }
 
-/// The limits, lowered where they would let speed or acceleration change within so few ticks that no span could
+/// The limits, cut to what the certificate takes at its word, and lowered where they would let speed or acceleration change within so few ticks that no span could
 /// follow.
 ///
 /// A move that is over in 8 ticks has its jerk lowered: rest to rest under jerk alone takes T with L = J T^3/32. Full
@@ -94,14 +94,18 @@ fn slowed(problem: &Problem) -> Vec<AxisLimits> {
     const MOVE_TICKS: f64 = 8.0;
     const SPEED_TICKS: f64 = 6.0;
     const ACCELERATION_TICKS: f64 = 2.0;
+    let cut = |limit: f64| if limit.is_finite() { limit.min(LARGEST_LIMIT) } else { limit };
+    let limits = problem.limits.iter().map(|l| AxisLimits {
+        velocity: cut(l.velocity),
+        acceleration: cut(l.acceleration),
+        jerk: cut(l.jerk),
+    });
     let tick = problem.control_tick_s;
     if tick == 0.0 {
-        return problem.limits.to_vec();
+        return limits.collect();
     }
     let shortest = MOVE_TICKS * tick;
-    problem
-        .limits
-        .iter()
+    limits
         .zip(&problem.path.axes)
         .map(|(l, axis)| {
             let acceleration = l.acceleration.min(l.velocity / (SPEED_TICKS * tick));
@@ -162,11 +166,27 @@ impl Attempt<'_> {
             if let Some((x, gap_s)) = self.optimise(&source, &half, iterations) {
                 let table = rounding::table(&source, scale, &x);
                 if let Some(parts) = check::format(layout, &table) {
+                    eprintln!(
+                        "DBG format {} spans, {} to divide, first {:?} rest {} {} code {}",
+                        layout.spans(),
+                        parts.iter().filter(|&&p| p > 1).count(),
+                        parts.iter().position(|&p| p > 1),
+                        parts[0],
+                        parts[parts.len() - 1],
+                        source.largest_code
+                    );
                     return Ok(self.divided(&source, x, gap_s, parts));
                 }
                 match self.checked(&source, &half, table) {
                     Ok(plan) => return Ok(Solved::Plan(Plan { gap_s, ..plan })),
-                    Err(span) => worst = span,
+                    Err(span) => {
+                        eprintln!(
+                            "DBG rows broken at {span} of {} code {}",
+                            layout.spans(),
+                            source.largest_code
+                        );
+                        worst = span
+                    }
                 }
             }
             // Rounding alone breaks a limit: the codes are too coarse for the slowest places.

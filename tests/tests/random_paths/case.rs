@@ -9,8 +9,8 @@ use crate::chance::Chance;
 use crate::paths::{Shape, path, shape};
 
 /// Longest motion [s], and the most times that the quickest axis could build up its acceleration.
-const LONGEST_S: f64 = 1000.0;
-const MOST_RAMPS: f64 = 1000.0;
+const LONGEST_S: f64 = 100.0;
+const MOST_RAMPS: f64 = 100.0;
 
 /// One problem of the planner.
 #[derive(Clone, Debug)]

@@ -21,7 +21,7 @@ pub(crate) enum Shape {
     Cusp,
     /// A walk and the same way back.
     Reversal,
-    /// A walk with control points that repeat, up to a whole span that stands still.
+    /// A line with control points that repeat.
     Repeats,
 }
 
@@ -61,18 +61,17 @@ pub(crate) fn path(chance: &mut Chance, shape: Shape, axes: usize, scale: f64) -
     }
     let nodes: Vec<f64> = greville(&breaks).iter().map(|g| g * step).collect();
     let mut points = match shape {
-        Shape::Line => line(chance, axes, &nodes),
+        Shape::Line | Shape::Repeats => line(chance, axes, &nodes),
         Shape::OneAxis => one_axis(chance, axes, &nodes),
         Shape::Round => round(chance, axes, &nodes),
         Shape::Zigzag => walk(chance, axes, &nodes, 3.0),
-        Shape::Walk | Shape::Cusp | Shape::Reversal | Shape::Repeats => {
+        Shape::Walk | Shape::Cusp | Shape::Reversal => {
             let turn = chance.decades(-2.0, 0.5);
             walk(chance, axes, &nodes, turn)
         }
     };
     match shape {
-        Shape::Cusp => repeat(chance, &mut points, 2..4),
-        Shape::Repeats => repeat(chance, &mut points, 2..6),
+        Shape::Cusp | Shape::Repeats => repeat(chance, &mut points, 2..4),
         Shape::Reversal => {
             let n = points.len();
             (0..n / 2).for_each(|i| points[n - 1 - i] = points[i].clone());
@@ -163,13 +162,20 @@ fn round(chance: &mut Chance, axes: usize, nodes: &[f64]) -> Vec<Vec<f64>> {
     nodes.iter().map(|&u| (0..axes).map(|a| at(u, a)).collect()).collect()
 }
 
-/// Repeats control points at one to three places, so many in a row.
-fn repeat(chance: &mut Chance, points: &mut [Vec<f64>], count: std::ops::Range<usize>) {
-    for _ in 0..1 + chance.below(3) {
-        let run = (count.start + chance.below(count.len())).min(points.len() - 1);
-        // Never all of them: the path would not move.
+/// Repeats control points at up to three places, so many in a row. Four in a row would be a span along which nothing
+/// moves: no motion, and refused.
+fn repeat(chance: &mut Chance, points: &mut Vec<Vec<f64>>, count: std::ops::Range<usize>) {
+    for _ in 0..3 {
+        let run = count.start + chance.below(count.len());
+        if run >= points.len() {
+            continue;
+        }
         let first = chance.below(points.len() - run);
-        let shared = points[first].clone();
-        points[first..first + run].iter_mut().for_each(|p| p.clone_from(&shared));
+        let mut repeated = points.clone();
+        let shared = &points[first];
+        repeated[first..first + run].iter_mut().for_each(|p| p.clone_from(shared));
+        if repeated.windows(4).all(|w| w.iter().any(|p| *p != w[0])) {
+            *points = repeated;
+        }
     }
 }
