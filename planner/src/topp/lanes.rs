@@ -1,6 +1,7 @@
 //! Numbers side by side, for loops that the compiler turns into vector instructions.
 //!
-//! Only plain + - * / and comparisons: the results do not depend on which instructions a machine has.
+//! Only + - * / and sqrt, fused multiply-add and comparisons, all rounded correctly: the results do not depend on which
+//! instructions a machine has. Without fused multiply-add (x86 before 2013) they come slowly.
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
@@ -20,25 +21,22 @@ impl Lanes {
         Lanes([v; LANES])
     }
 
-    #[inline(always)]
-    fn with(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        let mut out = self;
-        for l in 0..LANES {
-            out.0[l] = f(self.0[l], other.0[l]);
-        }
-        out
-    }
-
     /// The larger of two; `self`'s where the other is not a number.
     #[inline(always)]
-    pub(super) fn max(self, other: Self) -> Self {
-        self.with(other, |a, b| if b > a { b } else { a })
+    pub(super) fn max(mut self, other: Self) -> Self {
+        for l in 0..LANES {
+            self.0[l] = if other.0[l] > self.0[l] { other.0[l] } else { self.0[l] };
+        }
+        self
     }
 
     /// The smaller of two; `self`'s where the other is not a number.
     #[inline(always)]
-    pub(super) fn min(self, other: Self) -> Self {
-        self.with(other, |a, b| if b < a { b } else { a })
+    pub(super) fn min(mut self, other: Self) -> Self {
+        for l in 0..LANES {
+            self.0[l] = if other.0[l] < self.0[l] { other.0[l] } else { self.0[l] };
+        }
+        self
     }
 
     #[inline(always)]
@@ -57,6 +55,15 @@ impl Lanes {
         self
     }
 
+    /// self + a b, rounded once.
+    #[inline(always)]
+    pub(super) fn plus(mut self, a: Lanes, b: Lanes) -> Self {
+        for l in 0..LANES {
+            self.0[l] = a.0[l].mul_add(b.0[l], self.0[l]);
+        }
+        self
+    }
+
     #[inline(always)]
     pub(super) fn total(&self) -> f64 {
         (self.0[0] + self.0[2]) + (self.0[1] + self.0[3])
@@ -65,46 +72,44 @@ impl Lanes {
     /// The largest lane, and at least `floor`.
     #[inline(always)]
     pub(super) fn largest(&self, floor: f64) -> f64 {
-        self.0.iter().fold(floor, |m, &v| if v > m { v } else { m })
+        let mut most = floor;
+        for l in 0..LANES {
+            most = if self.0[l] > most { self.0[l] } else { most };
+        }
+        most
     }
 
     /// The smallest lane, and at most `ceiling`.
     #[inline(always)]
     pub(super) fn smallest(&self, ceiling: f64) -> f64 {
-        self.0.iter().fold(ceiling, |m, &v| if v < m { v } else { m })
+        let mut least = ceiling;
+        for l in 0..LANES {
+            least = if self.0[l] < least { self.0[l] } else { least };
+        }
+        least
     }
 }
 
-impl Add for Lanes {
-    type Output = Lanes;
-    #[inline(always)]
-    fn add(self, other: Lanes) -> Lanes {
-        self.with(other, |a, b| a + b)
-    }
+macro_rules! lane_by_lane {
+    ($($name:ident, $method:ident, $assign:tt;)*) => {$(
+        impl $name for Lanes {
+            type Output = Lanes;
+            #[inline(always)]
+            fn $method(mut self, other: Lanes) -> Lanes {
+                for l in 0..LANES {
+                    self.0[l] $assign other.0[l];
+                }
+                self
+            }
+        }
+    )*};
 }
 
-impl Sub for Lanes {
-    type Output = Lanes;
-    #[inline(always)]
-    fn sub(self, other: Lanes) -> Lanes {
-        self.with(other, |a, b| a - b)
-    }
-}
-
-impl Mul for Lanes {
-    type Output = Lanes;
-    #[inline(always)]
-    fn mul(self, other: Lanes) -> Lanes {
-        self.with(other, |a, b| a * b)
-    }
-}
-
-impl Div for Lanes {
-    type Output = Lanes;
-    #[inline(always)]
-    fn div(self, other: Lanes) -> Lanes {
-        self.with(other, |a, b| a / b)
-    }
+lane_by_lane! {
+    Add, add, +=;
+    Sub, sub, -=;
+    Mul, mul, *=;
+    Div, div, /=;
 }
 
 impl Mul<f64> for Lanes {
@@ -125,5 +130,17 @@ impl AddAssign for Lanes {
 /// a.c lane by lane.
 #[inline(always)]
 pub(super) fn product(a: &[Lanes; 3], c: &[f64; 3]) -> Lanes {
-    a[0] * c[0] + a[1] * c[1] + a[2] * c[2]
+    (a[0] * c[0]).plus(a[1], Lanes::splat(c[1])).plus(a[2], Lanes::splat(c[2]))
+}
+
+/// Three sums of lanes.
+#[inline(always)]
+pub(super) fn totals(v: &[Lanes; 3]) -> [f64; 3] {
+    [v[0].total(), v[1].total(), v[2].total()]
+}
+
+/// `factor` a.
+#[inline(always)]
+pub(super) fn scaled(a: &[Lanes; 3], factor: Lanes) -> [Lanes; 3] {
+    [a[0] * factor, a[1] * factor, a[2] * factor]
 }

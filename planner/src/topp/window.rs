@@ -1,12 +1,14 @@
 //! Paths of any length: windows solved side by side, then once more round their joints.
 
+use std::cell::RefCell;
+
 use rayon::prelude::*;
 
 use super::ipm::{Run, SCALINGS, START_SLACK, Stretch, Workspace};
 use super::rows::RowSource;
 
 /// Spans per window.
-const WINDOW: usize = 2000;
+const WINDOW: usize = 4000;
 /// Spans re-solved on either side of a joint.
 const REACH: usize = 250;
 /// What the first stage leaves below every limit round a joint, so that the second starts well inside. Of the time it
@@ -15,6 +17,15 @@ const JOINT_MARGIN: f64 = 5e-3;
 
 /// Longest problem that is solved in one piece.
 pub(super) const WHOLE: usize = WINDOW + WINDOW / 4;
+
+thread_local! {
+    static WORKSPACE: RefCell<Workspace> = RefCell::default();
+}
+
+/// Runs `f` in this thread's workspace: memory that has been touched once is kept. `f` must not wait for other threads.
+fn in_workspace<R>(f: impl FnOnce(&mut Workspace) -> R) -> R {
+    WORKSPACE.with_borrow_mut(f)
+}
 
 /// All runs together.
 #[derive(Clone, Copy, Debug, Default)]
@@ -42,12 +53,13 @@ pub(super) fn solve(
 ) -> Option<Total> {
     let m = x.len();
     if m <= whole {
-        let mut work = Workspace::default();
-        work.load(source, x, half, Stretch { from: 0, to: m }, |_| 0.0);
-        work.scale_into()?;
-        let run = work.solve(relative_gap);
-        *x = work.moved();
-        return Some(Total::of(run));
+        return in_workspace(|work| {
+            work.load(source, x, half, Stretch { from: 0, to: m }, |_| 0.0);
+            work.scale_into()?;
+            let run = work.solve(relative_gap);
+            *x = work.moved();
+            Some(Total::of(run))
+        });
     }
     scale_all(source, x, half)?;
     let count = m.div_ceil(WINDOW);
@@ -86,10 +98,12 @@ fn stage(
     let before: &[f64] = x;
     let solved: Vec<(Vec<f64>, Run)> = stretches
         .par_iter()
-        .map_init(Workspace::default, |work, &stretch| {
-            work.load(source, before, half, stretch, &margin);
-            let run = if work.settle() > 0.0 { work.solve(relative_gap) } else { Run::default() };
-            (if run.iterations == 0 { Vec::new() } else { work.moved() }, run)
+        .map(|&stretch| {
+            in_workspace(|work| {
+                work.load(source, before, half, stretch, &margin);
+                let run = if work.settle() > 0.0 { work.solve(relative_gap) } else { Run::default() };
+                (if run.iterations == 0 { Vec::new() } else { work.moved() }, run)
+            })
         })
         .collect();
     let mut total = Total::default();
@@ -110,9 +124,11 @@ fn scale_all(source: &RowSource, x: &mut [f64], half: &[f64]) -> Option<()> {
         let starts: Vec<usize> = (0..m).step_by(WINDOW / 4).collect();
         let least = starts
             .par_iter()
-            .map_init(Workspace::default, |work, &from| {
-                work.load(source, x, half, Stretch { from, to: (from + WINDOW / 4).min(m) }, |_| 0.0);
-                work.settle()
+            .map(|&from| {
+                in_workspace(|work| {
+                    work.load(source, x, half, Stretch { from, to: (from + WINDOW / 4).min(m) }, |_| 0.0);
+                    work.settle()
+                })
             })
             .reduce(|| f64::INFINITY, f64::min);
         if least > START_SLACK {

@@ -1,7 +1,8 @@
 //! Rows of the cells, lanes side by side, and the passes over them.
 
-use super::super::lanes::{LANES, Lanes, product};
+use super::super::lanes::{LANES, Lanes, product, scaled, totals};
 use super::super::rows::{CellRows, Row, dot};
+use super::band::Band;
 
 /// Share of a limit that rounding always leaves to the solver.
 const LEAST_ROOM: f64 = 0.05;
@@ -66,17 +67,6 @@ pub(super) struct Rows {
     pairs: Vec<Pair>,
 }
 
-/// What a cell adds to the Newton system.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Normal {
-    /// Sum of z/slack a a^T, upper triangle by rows.
-    pub(super) m: [f64; 6],
-    /// Sum of a/slack.
-    pub(super) g: [f64; 3],
-    /// Sum of z slack.
-    pub(super) gap: f64,
-}
-
 /// What the second pass finds: how far the affine step may go, and what it would do to the gap.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Affine {
@@ -105,19 +95,19 @@ impl Tangent {
     /// Both slacks of a block with the jerks f.c.
     #[inline(always)]
     fn slacks(&self, k: usize, room: Lanes, f: Lanes) -> [Lanes; 2] {
-        let base = Lanes::splat(self.base[k]) + room * self.alpha;
-        let force = f * self.alpha;
-        [base - force, base + force]
+        let base = Lanes::splat(self.base[k]).plus(room, Lanes::splat(self.alpha));
+        [base.plus(f, Lanes::splat(-self.alpha)), base.plus(f, Lanes::splat(self.alpha))]
     }
 
     /// Both rows of a block.
     #[inline(always)]
     fn rows(&self, k: usize, f: &[Lanes; 3]) -> [[Lanes; 3]; 2] {
-        let force = f.map(|f| f * self.alpha);
-        let x = self.x[k].map(Lanes::splat);
+        let (up, down) = (Lanes::splat(self.alpha), Lanes::splat(-self.alpha));
+        let x = &self.x[k];
+        let (x0, x1, x2) = (Lanes::splat(x[0]), Lanes::splat(x[1]), Lanes::splat(x[2]));
         [
-            [x[0] + force[0], x[1] + force[1], x[2] + force[2]],
-            [x[0] - force[0], x[1] - force[1], x[2] - force[2]],
+            [x0.plus(f[0], up), x1.plus(f[1], up), x2.plus(f[2], up)],
+            [x0.plus(f[0], down), x1.plus(f[1], down), x2.plus(f[2], down)],
         ]
     }
 }
@@ -133,8 +123,14 @@ impl Cell {
     #[inline(always)]
     fn tangent(&self, s: f64, c: &[f64; 3]) -> Tangent {
         let (alpha, beta) = (1.0 / (1.5 * s), s * s / 3.0);
-        let base = [0, 1, 2].map(|k| self.rhs - beta * (dot(&self.x[k], c) + self.xi[k]) - alpha);
-        Tangent { alpha, base, x: self.x.map(|r| r.map(|v| v * beta)) }
+        let mut out = Tangent { alpha, base: [0.0; 3], x: [[0.0; 3]; 3] };
+        for k in 0..3 {
+            out.base[k] = self.rhs - beta * (dot(&self.x[k], c) + self.xi[k]) - alpha;
+            for j in 0..3 {
+                out.x[k][j] = self.x[k][j] * beta;
+            }
+        }
+        out
     }
 
     /// The Bernstein coefficient of jerk block `b`.
@@ -392,73 +388,82 @@ impl Rows {
             }
             let t = cell.tangent(cell.s, &c);
             for (b, p) in jerks.iter_mut().enumerate() {
-                p.z = t.slacks(cell.coefficient(b), p.room, product(&p.f, &c)).map(|slack| mu / slack);
+                let slack = t.slacks(cell.coefficient(b), p.room, product(&p.f, &c));
+                p.z = [mu / slack[0], mu / slack[1]];
                 p.dz = [Lanes::ZERO; 2];
             }
         }
     }
 
-    /// First pass: z takes its step, tangents move, and every cell's part of the Newton matrix goes to `add`.
+    /// First pass: z takes its step, tangents move, and every cell adds to the Newton matrix and, per unit of mu, to
+    /// `push`; returns the gap.
     #[inline(always)]
-    pub(super) fn normal(&mut self, c: &[f64], step: f64, mut add: impl FnMut(usize, &Normal)) {
+    pub(super) fn normal(&mut self, c: &[f64], step: f64, band: &mut Band, push: &mut [f64]) -> f64 {
+        let step = Lanes::splat(step);
+        let mut gap = Lanes::ZERO;
         let (cells, mut blocks) = self.split();
         for cell in cells {
             let (uppers, bends, jerks) = blocks.next(cell);
-            let at = cell.at as usize;
             let c = cell.controls(c);
             let mut sum = Sums::default();
             for u in uppers {
-                u.z += u.dz * step;
+                u.z = u.z.plus(u.dz, step);
                 let slack = u.room - product(&u.a, &c);
                 let inverse = Lanes::splat(1.0) / slack;
                 sum.matrix(&u.a, u.z * inverse);
-                sum.push(&u.a, inverse);
-                sum.gap += u.z * slack;
+                grow(&mut sum.g, &u.a, inverse);
+                gap = gap.plus(u.z, slack);
             }
             for p in bends {
-                p.z[0] += p.dz[0] * step;
-                p.z[1] += p.dz[1] * step;
+                p.z[0] = p.z[0].plus(p.dz[0], step);
+                p.z[1] = p.z[1].plus(p.dz[1], step);
                 let f = product(&p.f, &c);
                 let slack = [p.room - f, p.room + f];
                 let inverse = inverses(&slack);
                 sum.matrix(&p.f, p.z[0] * inverse[0] + p.z[1] * inverse[1]);
-                sum.push(&p.f, inverse[0] - inverse[1]);
-                sum.gap += p.z[0] * slack[0] + p.z[1] * slack[1];
+                grow(&mut sum.g, &p.f, inverse[0] - inverse[1]);
+                gap = gap.plus(p.z[0], slack[0]).plus(p.z[1], slack[1]);
             }
             if !jerks.is_empty() {
                 cell.move_tangent(jerks, &c);
-            }
-            let t = cell.tangent(cell.s, &c);
-            for (b, p) in jerks.iter_mut().enumerate() {
-                p.z[0] += p.dz[0] * step;
-                p.z[1] += p.dz[1] * step;
-                let k = cell.coefficient(b);
-                let slack = t.slacks(k, p.room, product(&p.f, &c));
-                let rows = t.rows(k, &p.f);
-                let inverse = inverses(&slack);
-                for side in 0..2 {
-                    sum.matrix(&rows[side], p.z[side] * inverse[side]);
-                    sum.push(&rows[side], inverse[side]);
-                    sum.gap += p.z[side] * slack[side];
+                let t = cell.tangent(cell.s, &c);
+                for (b, p) in jerks.iter_mut().enumerate() {
+                    p.z[0] = p.z[0].plus(p.dz[0], step);
+                    p.z[1] = p.z[1].plus(p.dz[1], step);
+                    let k = cell.coefficient(b);
+                    let slack = t.slacks(k, p.room, product(&p.f, &c));
+                    let [up, down] = t.rows(k, &p.f);
+                    let inverse = inverses(&slack);
+                    sum.matrix(&up, p.z[0] * inverse[0]);
+                    sum.matrix(&down, p.z[1] * inverse[1]);
+                    grow(&mut sum.g, &up, inverse[0]);
+                    grow(&mut sum.g, &down, inverse[1]);
+                    gap = gap.plus(p.z[0], slack[0]).plus(p.z[1], slack[1]);
                 }
             }
-            add(at, &sum.finish());
+            let at = cell.at as usize;
+            let m = &sum.m;
+            let m = [m[0].total(), m[1].total(), m[2].total(), m[3].total(), m[4].total(), m[5].total()];
+            band.add(at, &m);
+            add(push, at, &sum.g);
         }
+        gap.total()
     }
 
-    /// Second pass: the affine step `dc` against the slacks; its second-order terms go, as gradients, to `add`.
+    /// Second pass: the affine step `dc` against the slacks; its second-order terms, as gradients, go to
+    /// `correction`.
     #[inline(always)]
-    pub(super) fn affine(&mut self, c: &[f64], dc: &[f64], mut add: impl FnMut(usize, &[f64; 3])) -> Affine {
+    pub(super) fn affine(&mut self, c: &[f64], dc: &[f64], correction: &mut [f64]) -> Affine {
         let mut all = AffineSums::default();
         let (cells, mut blocks) = self.split();
         for cell in cells {
             let (uppers, bends, jerks) = blocks.next(cell);
             let (c, dc) = (cell.controls(c), cell.controls(dc));
             let mut sum = [Lanes::ZERO; 3];
-            let mut grow = |a: &[Lanes; 3], w: Lanes| (0..3).for_each(|j| sum[j] += a[j] * w);
             for u in uppers {
                 let inverse = Lanes::splat(1.0) / (u.room - product(&u.a, &c));
-                grow(&u.a, all.row(product(&u.a, &dc), u.z, inverse) * inverse);
+                let w = all.row(product(&u.a, &dc), u.z, inverse) * inverse;
+                grow(&mut sum, &u.a, w);
             }
             for p in bends {
                 let f = product(&p.f, &c);
@@ -466,19 +471,21 @@ impl Rows {
                 let d = product(&p.f, &dc);
                 let up = all.row(d, p.z[0], inverse[0]) * inverse[0];
                 let down = all.row(Lanes::ZERO - d, p.z[1], inverse[1]) * inverse[1];
-                grow(&p.f, up - down);
+                grow(&mut sum, &p.f, up - down);
             }
-            let t = cell.tangent(cell.s, &c);
-            for (b, p) in jerks.iter().enumerate() {
-                let k = cell.coefficient(b);
-                let inverse = inverses(&t.slacks(k, p.room, product(&p.f, &c)));
-                let rows = t.rows(k, &p.f);
-                for side in 0..2 {
-                    let d = product(&rows[side], &dc);
-                    grow(&rows[side], all.row(d, p.z[side], inverse[side]) * inverse[side]);
+            if !jerks.is_empty() {
+                let t = cell.tangent(cell.s, &c);
+                for (b, p) in jerks.iter().enumerate() {
+                    let k = cell.coefficient(b);
+                    let inverse = inverses(&t.slacks(k, p.room, product(&p.f, &c)));
+                    let [up, down] = t.rows(k, &p.f);
+                    let w = all.row(product(&up, &dc), p.z[0], inverse[0]) * inverse[0];
+                    grow(&mut sum, &up, w);
+                    let w = all.row(product(&down, &dc), p.z[1], inverse[1]) * inverse[1];
+                    grow(&mut sum, &down, w);
                 }
             }
-            add(cell.at as usize, &sum.map(|v| v.total()));
+            add(correction, cell.at as usize, &sum);
         }
         all.finish()
     }
@@ -487,84 +494,102 @@ impl Rows {
     /// the largest of a.dc/slack and of -dz/z.
     #[inline(always)]
     pub(super) fn combined(&mut self, c: &[f64], da: &[f64], dc: &[f64], mu: f64) -> [f64; 2] {
-        let mut most = [Lanes::ZERO; 2];
-        let mu = Lanes::splat(mu);
-        let mut row = |da: Lanes, dc: Lanes, z: Lanes, inverse: Lanes| {
-            let (ra, r) = (da * inverse, dc * inverse);
-            let correction = z * da * (Lanes::splat(1.0) - ra);
-            most[0] = most[0].max(r);
-            (mu - correction) * inverse - z + z * r
-        };
-        let mut dual = Lanes::ZERO;
+        let mut all = Combined { mu: Lanes::splat(mu), rise: Lanes::ZERO, fall: Lanes::ZERO };
         let (cells, mut blocks) = self.split();
         for cell in cells {
             let (uppers, bends, jerks) = blocks.next(cell);
             let (c, da, dc) = (cell.controls(c), cell.controls(da), cell.controls(dc));
             for u in uppers {
                 let inverse = Lanes::splat(1.0) / (u.room - product(&u.a, &c));
-                u.dz = row(product(&u.a, &da), product(&u.a, &dc), u.z, inverse);
-                dual = dual.max(Lanes::ZERO - u.dz / u.z);
+                u.dz = all.row(product(&u.a, &da), product(&u.a, &dc), u.z, inverse);
+                all.fall = all.fall.max(Lanes::ZERO - u.dz / u.z);
             }
             for p in bends {
                 let f = product(&p.f, &c);
                 let inverse = inverses(&[p.room - f, p.room + f]);
                 let (a, d) = (product(&p.f, &da), product(&p.f, &dc));
-                p.dz[0] = row(a, d, p.z[0], inverse[0]);
-                p.dz[1] = row(Lanes::ZERO - a, Lanes::ZERO - d, p.z[1], inverse[1]);
-                dual = fastest_fall(p, dual);
+                p.dz[0] = all.row(a, d, p.z[0], inverse[0]);
+                p.dz[1] = all.row(Lanes::ZERO - a, Lanes::ZERO - d, p.z[1], inverse[1]);
+                all.fastest_fall(p);
             }
-            let t = cell.tangent(cell.s, &c);
-            for (b, p) in jerks.iter_mut().enumerate() {
-                let k = cell.coefficient(b);
-                let inverse = inverses(&t.slacks(k, p.room, product(&p.f, &c)));
-                let rows = t.rows(k, &p.f);
-                for side in 0..2 {
-                    let (a, d) = (product(&rows[side], &da), product(&rows[side], &dc));
-                    p.dz[side] = row(a, d, p.z[side], inverse[side]);
+            if !jerks.is_empty() {
+                let t = cell.tangent(cell.s, &c);
+                for (b, p) in jerks.iter_mut().enumerate() {
+                    let k = cell.coefficient(b);
+                    let inverse = inverses(&t.slacks(k, p.room, product(&p.f, &c)));
+                    let [up, down] = t.rows(k, &p.f);
+                    p.dz[0] = all.row(product(&up, &da), product(&up, &dc), p.z[0], inverse[0]);
+                    p.dz[1] = all.row(product(&down, &da), product(&down, &dc), p.z[1], inverse[1]);
+                    all.fastest_fall(p);
                 }
-                dual = fastest_fall(p, dual);
             }
         }
-        [most[0].largest(0.0), dual.largest(0.0)]
+        [all.rise.largest(0.0), all.fall.largest(0.0)]
     }
 }
 
-/// The larger of `most` and both -dz/z, by one division.
+/// sum += w a.
 #[inline(always)]
-fn fastest_fall(p: &Pair, most: Lanes) -> Lanes {
-    let inverse = inverses(&p.z);
-    let fall = (p.dz[0] * inverse[0]).min(p.dz[1] * inverse[1]);
-    most.max(Lanes::ZERO - fall)
+fn grow(sum: &mut [Lanes; 3], a: &[Lanes; 3], w: Lanes) {
+    sum[0] = sum[0].plus(a[0], w);
+    sum[1] = sum[1].plus(a[1], w);
+    sum[2] = sum[2].plus(a[2], w);
+}
+
+/// Adds sums over lanes to three neighbours from `at` on.
+#[inline(always)]
+fn add(to: &mut [f64], at: usize, sum: &[Lanes; 3]) {
+    let sum = totals(sum);
+    to[at] += sum[0];
+    to[at + 1] += sum[1];
+    to[at + 2] += sum[2];
+}
+
+/// What the third pass gathers.
+struct Combined {
+    mu: Lanes,
+    /// Largest of a.dc/slack.
+    rise: Lanes,
+    /// Largest of -dz/z.
+    fall: Lanes,
+}
+
+impl Combined {
+    /// The steps of z of rows with a.da and a.dc.
+    #[inline(always)]
+    fn row(&mut self, da: Lanes, dc: Lanes, z: Lanes, inverse: Lanes) -> Lanes {
+        let r = dc * inverse;
+        let correction = z * da * (Lanes::splat(1.0) - da * inverse);
+        self.rise = self.rise.max(r);
+        ((self.mu - correction) * inverse - z).plus(z, r)
+    }
+
+    /// Takes in both -dz/z by one division.
+    #[inline(always)]
+    fn fastest_fall(&mut self, p: &Pair) {
+        let inverse = inverses(&p.z);
+        let fall = (p.dz[0] * inverse[0]).min(p.dz[1] * inverse[1]);
+        self.fall = self.fall.max(Lanes::ZERO - fall);
+    }
 }
 
 #[derive(Default)]
 struct Sums {
     m: [Lanes; 6],
     g: [Lanes; 3],
-    gap: Lanes,
 }
 
 impl Sums {
     /// Adds w a a^T.
     #[inline(always)]
     fn matrix(&mut self, a: &[Lanes; 3], w: Lanes) {
-        let b = [a[0] * w, a[1] * w, a[2] * w];
-        self.m[0] += b[0] * a[0];
-        self.m[1] += b[0] * a[1];
-        self.m[2] += b[0] * a[2];
-        self.m[3] += b[1] * a[1];
-        self.m[4] += b[1] * a[2];
-        self.m[5] += b[2] * a[2];
-    }
-
-    #[inline(always)]
-    fn push(&mut self, a: &[Lanes; 3], w: Lanes) {
-        (0..3).for_each(|j| self.g[j] += a[j] * w);
-    }
-
-    #[inline(always)]
-    fn finish(&self) -> Normal {
-        Normal { m: self.m.map(|v| v.total()), g: self.g.map(|v| v.total()), gap: self.gap.total() }
+        let b = scaled(a, w);
+        self.m[0] = self.m[0].plus(b[0], a[0]);
+        self.m[1] = self.m[1].plus(b[0], a[1]);
+        self.m[2] = self.m[2].plus(b[0], a[2]);
+        self.m[3] = self.m[3].plus(b[1], a[1]);
+        self.m[4] = self.m[4].plus(b[1], a[2]);
+        self.m[5] = self.m[5].plus(b[2], a[2]);
     }
 }
 
@@ -582,7 +607,7 @@ impl AffineSums {
     fn row(&mut self, d: Lanes, z: Lanes, inverse: Lanes) -> Lanes {
         let (r, t) = (d * inverse, z * d);
         self.s1 += t;
-        self.s2 += t * r;
+        self.s2 = self.s2.plus(t, r);
         self.rise = self.rise.max(r);
         self.fall = self.fall.min(r);
         t * (Lanes::splat(1.0) - r)

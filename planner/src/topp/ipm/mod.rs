@@ -4,11 +4,11 @@
 mod band;
 mod block;
 
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use self::band::Band;
 use self::block::Rows;
-use super::lanes::{LANES, Lanes, product};
+use super::lanes::{LANES, Lanes, product, scaled, totals};
 use super::rows::{CellRows, RowBuilder, RowSource};
 
 /// Share of the Hessian of the time that joins the barrier's (0 diverges on some problems, 1 is slow).
@@ -92,24 +92,11 @@ impl Workspace {
         let end = (stretch.to + 1).min(m);
         let count = end - self.first;
         self.free = [stretch.from - self.first + 1, stretch.to - self.first + 1];
-        let get = |v: &[f64], j: usize| if j == 0 || j > m { 0.0 } else { v[j - 1] };
         self.c.clear();
         self.c.extend((self.first..end + 2).map(|j| if j == 0 || j > m { 1.0 } else { x[j - 1] }));
         self.rows.clear();
         self.spans.clear();
-        let Workspace { rows, spans, cell, first, .. } = self;
-        let first = *first;
-        Arch::new().dispatch(|| {
-            let mut builder = RowBuilder::new(source);
-            for (at, s) in (first..end).enumerate() {
-                let half = [get(half, s), get(half, s + 1), get(half, s + 2)];
-                for k in 0..usize::from(source.layout.cells[s + 1]) {
-                    builder.cell(s, k, cell);
-                    rows.push(at, cell, &half, margin(s));
-                }
-                spans.push(SpanTime::new(source.layout.h[s + 1], &source.bezier(s)));
-            }
-        });
+        Arch::new().dispatch(Load { work: self, source, half, margin, end });
         self.rests.clear();
         let (h, fold) = (&source.layout.h, source.fold());
         if self.first == 0 {
@@ -137,8 +124,7 @@ impl Workspace {
 
     /// Sets the tangents for the loaded profile and returns their least slack.
     pub(super) fn settle(&mut self) -> f64 {
-        let (rows, c) = (&mut self.rows, &self.c);
-        Arch::new().dispatch(|| rows.set_tangents(c, ENOUGH))
+        Arch::new().dispatch(Settle { work: self })
     }
 
     /// The control values that could move, as the best iterate has them.
@@ -159,11 +145,18 @@ impl Workspace {
             time += t;
             let slope = t / x;
             let bend = slope / x * (CURVATURE * 0.75);
-            let b = span.a.map(|a| a * bend);
-            for j in 0..3 {
-                self.gradient[i + j] -= 0.5 * (slope * span.a[j]).total();
-            }
-            let m = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|(j, k)| (b[j] * span.a[k]).total());
+            let a = &span.a;
+            let b = scaled(a, bend);
+            let g = totals(&scaled(a, slope));
+            self.gradient[i..i + 3].iter_mut().zip(g).for_each(|(sum, g)| *sum -= 0.5 * g);
+            let m = [
+                (b[0] * a[0]).total(),
+                (b[0] * a[1]).total(),
+                (b[0] * a[2]).total(),
+                (b[1] * a[1]).total(),
+                (b[1] * a[2]).total(),
+                (b[2] * a[2]).total(),
+            ];
             self.band.add(i, &m);
         }
         let mut time = time.total();
@@ -180,7 +173,7 @@ impl Workspace {
     /// Improves the loaded profile until the gap is below a share of the time. Every iterate keeps every row; the best
     /// is kept.
     pub(super) fn solve(&mut self, relative_gap: f64) -> Run {
-        Arch::new().dispatch(|| self.iterate(relative_gap))
+        Arch::new().dispatch(Solve { work: self, relative_gap })
     }
 
     #[inline(always)]
@@ -204,7 +197,9 @@ impl Workspace {
             run.iterations = iteration;
             self.band.reset(n);
             let time = self.time();
-            let gap = self.assemble(dual_step);
+            self.push.clear();
+            self.push.resize(n, 0.0);
+            let gap = self.rows.normal(&self.c, dual_step, &mut self.band, &mut self.push);
             if time < best_time {
                 best_time = time;
                 run.gap = gap;
@@ -223,21 +218,6 @@ impl Workspace {
         run
     }
 
-    /// First pass: the barrier's matrix and push; returns the gap.
-    #[inline(always)]
-    fn assemble(&mut self, dual_step: f64) -> f64 {
-        self.push.clear();
-        self.push.resize(self.c.len(), 0.0);
-        let mut gap = 0.0;
-        let Workspace { rows, band, push, c, .. } = self;
-        rows.normal(c, dual_step, |at, part| {
-            band.add(at, &part.m);
-            (0..3).for_each(|j| push[at + j] += part.g[j]);
-            gap += part.gap;
-        });
-        gap
-    }
-
     /// Predictor and corrector [Mehrotra1992]: fills `dc`, returns primal and dual step lengths.
     #[inline(always)]
     fn step(&mut self, gap: f64, rows: f64) -> Option<[f64; 2]> {
@@ -250,8 +230,7 @@ impl Workspace {
         self.band.solve(lo, hi, &mut self.affine);
         self.correction.clear();
         self.correction.resize(n, 0.0);
-        let Workspace { rows: blocks, correction, c, affine: da, .. } = self;
-        let affine = blocks.affine(c, da, |at, part| (0..3).for_each(|j| correction[at + j] += part[j]));
+        let affine = self.rows.affine(&self.c, &self.affine, &mut self.correction);
         let primal = (1.0 / affine.rise).min(1.0);
         let dual = (1.0 / (1.0 - affine.fall)).min(1.0);
         let (s1, s2) = (affine.s1, affine.s2);
@@ -270,6 +249,71 @@ impl Workspace {
         let dual = (TO_BOUNDARY / fall).min(1.0);
         let sound = primal.is_finite() && dual.is_finite() && self.dc[lo..hi].iter().all(|d| d.is_finite());
         sound.then_some([primal, dual])
+    }
+}
+
+/// Loading, with the vector instructions of the machine.
+struct Load<'w, 's, 'a, M> {
+    work: &'w mut Workspace,
+    source: &'s RowSource<'a>,
+    half: &'s [f64],
+    margin: M,
+    /// One past the last inner span.
+    end: usize,
+}
+
+impl<M: Fn(usize) -> f64> WithSimd for Load<'_, '_, '_, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Workspace { rows, spans, cell, first, .. } = self.work;
+        let (source, m) = (self.source, self.half.len());
+        let mut builder = RowBuilder::new(source);
+        for (at, s) in (*first..self.end).enumerate() {
+            let mut half = [0.0; 3];
+            for (j, half) in (s..).zip(&mut half) {
+                if (1..=m).contains(&j) {
+                    *half = self.half[j - 1];
+                }
+            }
+            let margin = (self.margin)(s);
+            for k in 0..usize::from(source.layout.cells[s + 1]) {
+                builder.cell(s, k, cell);
+                rows.push(at, cell, &half, margin);
+            }
+            spans.push(SpanTime::new(source.layout.h[s + 1], &source.bezier(s)));
+        }
+    }
+}
+
+/// Setting tangents, with the vector instructions of the machine.
+struct Settle<'w> {
+    work: &'w mut Workspace,
+}
+
+impl WithSimd for Settle<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let Workspace { rows, c, .. } = self.work;
+        rows.set_tangents(c, ENOUGH)
+    }
+}
+
+/// Solving, with the vector instructions of the machine.
+struct Solve<'w> {
+    work: &'w mut Workspace,
+    relative_gap: f64,
+}
+
+impl WithSimd for Solve<'_> {
+    type Output = Run;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Run {
+        self.work.iterate(self.relative_gap)
     }
 }
 
