@@ -209,7 +209,8 @@ impl<'a> Grid<'a> {
         let unit = self.unit;
         let [value, slope, bend] = &place.weights;
         for (&[p1, p2, p3], l) in place.axes.iter().zip(self.limits) {
-            let mut add = |f: &dyn Fn(usize) -> f64| rows.push(((0..3).map(|j| (k + j, f(j))).collect(), 1.0));
+            let mut add =
+                |f: &dyn Fn(usize) -> f64| rows.push(((0..3).map(|j| (k + j, f(j))).collect(), 1.0));
             let (v, a) = (unit * (p1 / l.velocity).powi(2), unit / l.acceleration);
             add(&|j| v * value[j]);
             let f = unit * (unit * x).sqrt() / l.jerk;
@@ -224,7 +225,8 @@ impl<'a> Grid<'a> {
     /// Time of controls `x` [s], by the same sum.
     fn time(&self, places: &[[Place; 3]], x: &[f64]) -> f64 {
         let n = self.spans();
-        let inner: f64 = (0..n).map(|k| self.length(k) / combine(x, k, &places[k][1].weights[0]).sqrt()).sum();
+        let inner: f64 =
+            (0..n).map(|k| self.length(k) / combine(x, k, &places[k][1].weights[0]).sqrt()).sum();
         let rests = 3.0 * (self.rests[0] / x[0].sqrt() + self.rests[1] / x[n + 1].sqrt());
         (inner + rests) / self.unit.sqrt()
     }
