@@ -28,6 +28,9 @@ const OVER: f64 = 1.03;
 /// Spans per ramp: on these paths the usual four leave several per cent.
 const FINE: f64 = 16.0;
 
+/// Spans of the reference take about so long, or a third of a span of the path [s].
+const PART_S: f64 = 2.5e-3;
+
 /// The sample mill with the same limits on every axis and room for any part.
 fn machine() -> Machine {
     let text = include_str!("../../jobs/mill3.toml");
@@ -54,7 +57,8 @@ fn compare(name: &str, program: &str) {
         for table in [&table, &section.table] {
             assert!(table.codes.iter().all(|&c| c > 0), "{name}: q touches zero");
         }
-        let reference = minimum_time(path, limits, path.length()).expect("the reference is solved");
+        let longest = path.length() / (table.duration() / PART_S);
+        let reference = minimum_time(path, limits, longest).expect("the reference is solved");
         assert!(reference.converged && reference.ratios.iter().all(|&r| r < OVER), "{name}: {reference:?}");
         took += table.duration();
         usual += section.table.duration();

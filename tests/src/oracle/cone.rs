@@ -165,12 +165,12 @@ impl<'a> Grid<'a> {
         rows.cone(SupportedConeT::ZeroConeT(equal.len()), equal);
         rows.cone(SupportedConeT::NonnegativeConeT(upper.len()), upper);
         let mut cost = vec![0.0; 3 * n + 6];
-        for i in 0..n + 2 {
-            let (x, weight): (Vec<(usize, f64)>, f64) = match i.checked_sub(n) {
-                None => ((0..3).map(|j| (i + j, places[i][1].weights[0][j])).collect(), self.length(i)),
-                Some(0) => (vec![(0, 1.0)], 3.0 * self.rests[0]),
-                Some(_) => (vec![(n + 1, 1.0)], 3.0 * self.rests[1]),
-            };
+        let inner = places.iter().enumerate().map(|(k, places)| {
+            let weights = &places[1].weights[0];
+            ((0..3).map(|j| (k + j, weights[j])).collect::<Vec<_>>(), self.length(k))
+        });
+        let rests = [(vec![(0, 1.0)], 3.0 * self.rests[0]), (vec![(n + 1, 1.0)], 3.0 * self.rests[1])];
+        for (i, (x, weight)) in inner.chain(rests).enumerate() {
             let (s, t) = (n + 2 + i, 2 * n + 4 + i);
             cost[t] = weight / self.knots[n];
             let x: Vec<(usize, f64)> = x.into_iter().map(|(j, a)| (j, -a)).collect();
