@@ -23,7 +23,7 @@ const LONGER: f64 = 0.03;
 /// ... which may be this share faster than any motion: between the places where it asks for limits, jerk comes out up
 /// to so many times the limit.
 const FASTER: f64 = 0.01;
-const OVER: f64 = 1.03;
+const OVER: f64 = 1.05;
 
 /// Spans per ramp: on these paths the usual four leave several per cent.
 const FINE: f64 = 16.0;
