@@ -176,20 +176,27 @@ fn plan_item<E>(
     }
 }
 
+/// The program line that a fault of a section is about.
+pub fn line_of(fault: &PlanError, section: &Section) -> u32 {
+    section.marks.line_at(fault.place().unwrap_or(0.0) / section.path.step)
+}
+
 fn plan_section<E>(
     section: Section,
     machine: &Machine,
     set: LimitSet,
     settings: &Settings,
 ) -> Result<Planned, JobError<E>> {
-    let Section { kind, path, marks } = section;
-    let limits: Vec<AxisLimits> = machine.axes.iter().map(|axis| set.of(axis, kind)).collect();
-    let problem =
-        Problem { path: &path, limits: &limits, caps: &marks.caps, control_tick_s: machine.control_tick_s };
-    let plan = topp::plan(&problem, settings).map_err(|fault| JobError::Plan {
-        line: marks.line_at(fault.place().unwrap_or(0.0) / path.step),
-        fault,
-    })?;
+    let limits: Vec<AxisLimits> = machine.axes.iter().map(|axis| set.of(axis, section.kind)).collect();
+    let problem = Problem {
+        path: &section.path,
+        limits: &limits,
+        caps: &section.marks.caps,
+        control_tick_s: machine.control_tick_s,
+    };
+    let plan = topp::plan(&problem, settings)
+        .map_err(|fault| JobError::Plan { line: line_of(&fault, &section), fault })?;
+    let Section { kind, marks, .. } = section;
     let certificate = certify(&plan.table, &limits, &marks.caps);
     let section = PlannedSection { kind, limits, table: plan.table, marks };
     let binding = rulings(&section);

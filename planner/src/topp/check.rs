@@ -166,7 +166,7 @@ pub(super) fn format(layout: &Layout, table: &FeedTable) -> Option<Vec<u32>> {
         let law = table.law(i);
         let seconds = law.duration();
         if seconds >= LONGEST_S {
-            *part = (seconds / DIVIDED_S).ceil().min(1e6) as u32;
+            *part = ((seconds / DIVIDED_S).ceil().min(1e6) as u32).next_power_of_two();
             sound = false;
         }
         if let SpanLaw::Quadratic { h, q: [alpha, beta, gamma] } = law {
@@ -176,7 +176,7 @@ pub(super) fn format(layout: &Layout, table: &FeedTable) -> Option<Vec<u32>> {
             if curved > MOST_CURVED || alpha <= 0.0 || end <= 0.0 {
                 // At the same q, the argument falls with the square of the length.
                 let parts = (1.2 * (curved / MOST_CURVED).sqrt()).ceil().clamp(2.0, 8.0);
-                *part = (*part).max(parts as u32);
+                *part = (*part).max((parts as u32).next_power_of_two());
                 sound = false;
             }
         }

@@ -7,6 +7,7 @@
 mod check;
 mod clarabel;
 mod error;
+mod insert;
 mod ipm;
 mod knots;
 mod lanes;
@@ -23,14 +24,19 @@ mod window;
 
 pub use error::{LimitKind, PathFault, PlanError};
 
+use crate::feed::table::FeedTable;
 use crate::job::machine::AxisLimits;
 use layout::{Derivatives, Layout, Pieces, strictest};
 use problem::{Plan, Problem, Settings, Solver};
 use rows::RowSource;
 use sweep::Sweep;
 
-/// Rounds of dividing spans that the format does not allow.
-const MOST_REFINEMENTS: usize = 12;
+/// Solutions on ever finer knots.
+const MOST_SOLUTIONS: usize = 6;
+/// Rounds of dividing the spans of one solution.
+const MOST_DIVISIONS: usize = 48;
+/// Shares of q that are tried when the rounding on divided spans takes a little more than what was set aside for it.
+const SLOWER: [f64; 3] = [1.0, 0.9999, 0.999];
 /// Rounds of making the codes finer at the expense of top speed.
 const MOST_RESCALES: usize = 6;
 /// Headroom of the codes above the swept q.
@@ -63,29 +69,20 @@ fn plan_whole_up_to(whole: usize, problem: &Problem, settings: &Settings) -> Res
     let mut iterations = 0;
     // Spans that had to be divided are short: finer codes keep rounding from slowing them.
     let mut largest_code = rounding::SHORT_CODE;
-    for _ in 0..MOST_REFINEMENTS {
-        let plan = attempt.solve(&layout, largest_code, &mut iterations)?;
-        let Some(parts) = check::format(&layout, &plan.table) else {
-            return Ok(Plan { iterations, ..plan });
-        };
-        layout = match knots::refine(problem.path, &layout, &parts) {
-            Ok(refined) => refined,
-            Err(span) => {
-                let fault = format_error(problem, &layout, &plan, span);
-                return attempt.gentle(&placed, &mut iterations).ok_or(fault);
+    let mut fault = None;
+    for _ in 0..MOST_SOLUTIONS {
+        layout = match attempt.solve(&layout, largest_code, &mut iterations)? {
+            Solved::Plan(plan) => return Ok(Plan { iterations, ..plan }),
+            Solved::Divided(finer) => finer,
+            Solved::Indivisible(e) => {
+                fault = Some(e);
+                break;
             }
         };
         largest_code = rounding::LONG_CODE;
     }
-    let plan = attempt.solve(&layout, largest_code, &mut iterations)?;
-    match check::format(&layout, &plan.table) {
-        None => Ok(Plan { iterations, ..plan }),
-        Some(parts) => {
-            let span = parts.iter().position(|&p| p > 1).unwrap_or(0);
-            let fault = format_error(problem, &layout, &plan, span);
-            attempt.gentle(&placed, &mut iterations).ok_or(fault)
-        }
-    }
+    let uneven = PlanError::Uneven { span: 0, u: 0.0 };
+    attempt.gentle(&placed, &mut iterations).ok_or(fault.unwrap_or(uneven))
 }
 
 /// The limits, lowered where they would let speed or acceleration change within so few ticks that no span could
@@ -120,12 +117,6 @@ fn slowed(problem: &Problem) -> Vec<AxisLimits> {
         .collect()
 }
 
-fn format_error(problem: &Problem, layout: &Layout, plan: &Plan, span: usize) -> PlanError {
-    let u = layout.start(problem.path, span);
-    let seconds = plan.table.law(span).duration();
-    if seconds >= 1.0 { PlanError::Slow { span, u, seconds } } else { PlanError::Uneven { span, u } }
-}
-
 fn validate_settings(settings: &Settings) -> Result<(), PlanError> {
     let sound = |v: f64| v > 0.0 && v.is_finite();
     if !sound(settings.relative_gap) {
@@ -135,6 +126,16 @@ fn validate_settings(settings: &Settings) -> Result<(), PlanError> {
         return Err(PlanError::Setting { name: "spans_per_ramp", value: settings.spans_per_ramp });
     }
     Ok(())
+}
+
+/// What became of a solution.
+enum Solved {
+    /// It is a plan.
+    Plan(Plan),
+    /// It has to be found anew on finer knots.
+    Divided(Layout),
+    /// Its spans must be divided further than the grid allows.
+    Indivisible(PlanError),
 }
 
 /// What one solution after another is found from.
@@ -147,7 +148,7 @@ struct Attempt<'a> {
 
 impl Attempt<'_> {
     /// Solves on given knots, rounds and checks.
-    fn solve(&self, layout: &Layout, largest_code: f64, iterations: &mut u64) -> Result<Plan, PlanError> {
+    fn solve(&self, layout: &Layout, largest_code: f64, iterations: &mut u64) -> Result<Solved, PlanError> {
         let problem = self.problem;
         let unit = self.sweep.top();
         let joints = joints(problem, layout);
@@ -160,12 +161,13 @@ impl Attempt<'_> {
             let half = rounding::halves(&source, scale, self.sweep);
             if let Some((x, gap_s)) = self.optimise(&source, &half, iterations) {
                 let table = rounding::table(&source, scale, &x);
-                let rounded = rounding::values(&source, &table);
-                let findings = check::rows(&source, &rounded, &half);
-                if findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC {
-                    return Ok(Plan { table, binding: findings.binding, iterations: 0, gap_s });
+                if let Some(parts) = check::format(layout, &table) {
+                    return Ok(self.divided(&source, x, gap_s, parts));
                 }
-                worst = findings.span;
+                match self.checked(&source, &half, table) {
+                    Ok(plan) => return Ok(Solved::Plan(Plan { gap_s, ..plan })),
+                    Err(span) => worst = span,
+                }
             }
             // Rounding alone breaks a limit: the codes are too coarse for the slowest places.
             if source.largest_code < rounding::LONG_CODE {
@@ -175,6 +177,63 @@ impl Attempt<'_> {
             }
         }
         Err(PlanError::Resolution { span: worst, u: layout.start(problem.path, worst) })
+    }
+
+    /// The plan of a rounded table that keeps every row, or the span that breaks one.
+    fn checked(&self, source: &RowSource, half: &[f64], table: FeedTable) -> Result<Plan, usize> {
+        let findings = check::rows(source, &rounding::values(source, &table), half);
+        if findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC {
+            Ok(Plan { table, binding: findings.binding, iterations: 0, gap_s: f64::INFINITY })
+        } else {
+            Err(findings.span)
+        }
+    }
+
+    /// The same motion on knots as fine as the format asks for, in the finest codes.
+    fn divided(&self, source: &RowSource, mut x: Vec<f64>, gap_s: f64, mut parts: Vec<u32>) -> Solved {
+        let path = self.problem.path;
+        let last = parts.len() - 1;
+        let fault = |layout: &Layout, span: usize, table: &FeedTable| {
+            let (u, seconds) = (layout.start(path, span), table.law(span).duration());
+            Solved::Indivisible(match seconds >= 1.0 {
+                true => PlanError::Slow { span, u, seconds },
+                false => PlanError::Uneven { span, u },
+            })
+        };
+        let mut layout = source.layout.clone();
+        let source = RowSource { largest_code: rounding::LONG_CODE, ..source.clone() };
+        if parts[0] > 1 || parts[last] > 1 {
+            // A rest span has no parts: the motion next to it becomes another.
+            return match knots::refine(path, &layout, &parts) {
+                Ok(finer) => Solved::Divided(finer),
+                Err(span) => fault(&layout, span, &rounding::table(&source, rounding::scale(&source), &x)),
+            };
+        }
+        for _ in 0..MOST_DIVISIONS {
+            let coarse = RowSource { layout: &layout, ..source.clone() };
+            (layout, x) = match insert::insert(&coarse, &x, &parts) {
+                Ok(finer) => finer,
+                Err(span) => {
+                    return fault(&layout, span, &rounding::table(&coarse, rounding::scale(&coarse), &x));
+                }
+            };
+            let swept = self.swept(&layout);
+            let fine = RowSource { layout: &layout, swept: &swept, ..source.clone() };
+            let scale = rounding::scale(&fine);
+            if let Some(more) = check::format(&layout, &rounding::table(&fine, scale, &x)) {
+                parts = more;
+                continue;
+            }
+            let half = rounding::halves(&fine, scale, self.sweep);
+            let slower = SLOWER.iter().find_map(|share| {
+                let slower: Vec<f64> = x.iter().map(|x| x * share).collect();
+                let table = rounding::table(&fine, scale, &slower);
+                let sound = check::format(&layout, &table).is_none();
+                self.checked(&fine, &half, table).ok().filter(|_| sound)
+            });
+            return slower.map_or(Solved::Divided(layout), |plan| Solved::Plan(Plan { gap_s, ..plan }));
+        }
+        Solved::Divided(layout)
     }
 
     /// A plan between the smooth start and the fastest motion, as near the latter as limits and format allow: for
@@ -195,7 +254,7 @@ impl Attempt<'_> {
             let plan = Plan { table, binding: findings.binding, iterations: 0, gap_s: f64::INFINITY };
             (keeps && check::format(layout, &plan.table).is_none()).then_some(plan)
         };
-        let mut slow = start::profile(&source).x;
+        let mut slow = start::profile(&source);
         let slowest = (0..SCALINGS).find_map(|_| {
             let plan = sound(&slow);
             if plan.is_none() {
@@ -250,21 +309,22 @@ impl Attempt<'_> {
     /// Control values of minimum time, and how far above the optimum they may be [s]; `None` where rounding alone
     /// would break a limit at any speed.
     fn optimise(&self, source: &RowSource, half: &[f64], iterations: &mut u64) -> Option<(Vec<f64>, f64)> {
-        let start::Start { mut x, bends } = start::profile(source);
-        let source = &RowSource { bends, ..source.clone() };
         let gap = self.settings.relative_gap;
-        match self.settings.solver {
-            Solver::InteriorPoint => {
-                let total = window::solve(source, &mut x, half, gap, self.whole)?;
-                *iterations += total.iterations;
-                Some((x, total.gap / source.unit.sqrt()))
-            }
-            Solver::Clarabel => {
-                let answer = clarabel::solve(source, &x, half, gap)?;
-                *iterations += answer.iterations;
-                Some((answer.x, answer.gap / source.unit.sqrt()))
-            }
-        }
+        start::candidates(source).into_iter().find_map(|start::Start { mut x, bends }| {
+            let source = &RowSource { bends, ..source.clone() };
+            let (x, gap, count) = match self.settings.solver {
+                Solver::InteriorPoint => {
+                    let total = window::solve(source, &mut x, half, gap, self.whole)?;
+                    (x, total.gap, total.iterations)
+                }
+                Solver::Clarabel => {
+                    let answer = clarabel::solve(source, &x, half, gap)?;
+                    (answer.x, answer.gap, answer.iterations)
+                }
+            };
+            *iterations += count;
+            Some((x, gap / source.unit.sqrt()))
+        })
     }
 }
 

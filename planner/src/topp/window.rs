@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use rayon::prelude::*;
 
-use super::ipm::{Run, SCALINGS, START_SLACK, Stretch, Workspace};
+use super::ipm::{Run, Stretch, Workspace};
 use super::rows::RowSource;
 
 /// Spans per window.
@@ -118,23 +118,20 @@ fn stage(
 }
 
 /// Scales the whole profile until its least slack is comfortable everywhere.
-fn scale_all(source: &RowSource, x: &mut [f64], half: &[f64]) -> Option<()> {
+pub(super) fn scale_all(source: &RowSource, x: &mut [f64], half: &[f64]) -> Option<()> {
     let m = x.len();
-    for _ in 0..SCALINGS {
-        let starts: Vec<usize> = (0..m).step_by(WINDOW / 4).collect();
-        let least = starts
-            .par_iter()
-            .map(|&from| {
-                in_workspace(|work| {
-                    work.load(source, x, half, Stretch { from, to: (from + WINDOW / 4).min(m) }, |_| 0.0);
-                    work.settle()
-                })
+    let starts: Vec<usize> = (0..m).step_by(WINDOW / 8).collect();
+    let before: &[f64] = x;
+    let scale = starts
+        .par_iter()
+        .map(|&from| {
+            in_workspace(|work| {
+                let stretch = Stretch { from, to: (from + WINDOW / 8).min(m) };
+                work.load(source, before, half, stretch, |_| 0.0);
+                work.scale_into()
             })
-            .reduce(|| f64::INFINITY, f64::min);
-        if least > START_SLACK {
-            return Some(());
-        }
-        x.iter_mut().for_each(|x| *x *= 0.8);
-    }
-    None
+        })
+        .try_reduce(|| 1.0, |a, b| Some(a.min(b)))?;
+    x.iter_mut().for_each(|x| *x *= scale);
+    Some(())
 }

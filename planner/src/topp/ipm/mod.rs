@@ -22,11 +22,11 @@ const LEAST_CENTRING: f64 = 1e-5;
 /// Most iterations; runs end after 13 to 30.
 const MOST_ITERATIONS: u32 = 80;
 /// Least slack a start is scaled down to.
-pub(super) const START_SLACK: f64 = 0.02;
+const START_SLACK: f64 = 0.02;
 /// Slack of a jerk row beyond which a better tangent is not looked for.
 const ENOUGH: f64 = 0.1;
 /// Most reductions of a start, by a fifth each.
-pub(super) const SCALINGS: u32 = 60;
+const SCALINGS: u32 = 60;
 
 /// A stretch of control values to improve while its surroundings stand still.
 #[derive(Clone, Copy, Debug)]
@@ -107,9 +107,8 @@ impl Workspace {
         }
     }
 
-    /// Scales the loaded profile down until its least slack is comfortable; `None` where that never happens.
-    ///
-    /// Only for a stretch that is the whole problem: pinned neighbours are scaled too.
+    /// Scales the loaded profile down until its least slack is comfortable, pinned neighbours too, and returns the
+    /// scale; `None` where that never happens.
     pub(super) fn scale_into(&mut self) -> Option<f64> {
         let mut scale = 1.0;
         for _ in 0..SCALINGS {
