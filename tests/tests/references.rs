@@ -42,8 +42,9 @@ fn machine() -> Machine {
     machine
 }
 
-/// Plans a program without its feeds and compares all its sections with their references.
-fn compare(name: &str, program: &str) {
+/// Plans a program without its feeds and compares all its sections with their references; an error says by how much a
+/// plan is slower, or faster than can be.
+fn compare(name: &str, program: &str) -> Result<(), String> {
     let machine = machine();
     let options = Options { ignore_feed: true, ..Options::default() };
     let chain = chain::plan(program.as_bytes(), &machine, &options, LimitSet::VelocityAccelerationJerk)
@@ -65,9 +66,11 @@ fn compare(name: &str, program: &str) {
         least += reference.time;
     }
     let over = |time: f64| 100.0 * (time / least - 1.0);
-    eprintln!("{name}: {took:.4} s, {:+.2} % of {least:.4} s; as usual {:+.2} %", over(took), over(usual));
-    assert!(took <= (1.0 + LONGER) * least, "{name}: {took} {least}");
-    assert!(took >= (1.0 - FASTER) * least, "{name}: {took} {least}");
+    let text =
+        format!("{name}: {took:.4} s, {:+.2} % of {least:.4} s; as usual {:+.2} %", over(took), over(usual));
+    eprintln!("{text}");
+    let near = ((1.0 - FASTER) * least..=(1.0 + LONGER) * least).contains(&took);
+    if near { Ok(()) } else { Err(text) }
 }
 
 /// A zigzag with so many corners of 20 to 60 degrees, 0.2 mm apart.
@@ -91,14 +94,14 @@ fn zigzag(corners: usize, tolerance: f64) -> String {
 
 #[test]
 fn rough_paths_do_not_stall() {
-    compare("150 corners", &zigzag(150, 0.01));
+    assert_eq!(compare("150 corners", &zigzag(150, 0.01)), Ok(()));
 }
 
 #[test]
 #[ignore = "takes a minute: cargo test --release -p tests --test references -- --ignored"]
 fn long_rough_paths_do_not_stall() {
     for tolerance in [0.01, 0.05] {
-        compare(&format!("600 corners, {tolerance} mm"), &zigzag(600, tolerance));
+        assert_eq!(compare(&format!("600 corners, {tolerance} mm"), &zigzag(600, tolerance)), Ok(()));
     }
 }
 
@@ -133,10 +136,12 @@ fn piece(path: &Path, tolerance: f64) -> String {
 fn pieces_of_programs_from_outside_do_not_stall() {
     let folder =
         std::env::var_os("FEEDSPLINE_REAL").expect("FEEDSPLINE_REAL names a folder of part programs");
+    let mut findings = Vec::new();
     for name in ["stellabee1.ngc.gz", "flower_mold.nc", "trochoidal.ngc.gz"] {
         let path = Path::new(&folder).join(name);
         for tolerance in [0.01, 0.05] {
-            compare(&format!("{name}, {tolerance} mm"), &piece(&path, tolerance));
+            findings.extend(compare(&format!("{name}, {tolerance} mm"), &piece(&path, tolerance)).err());
         }
     }
+    assert!(findings.is_empty(), "{findings:#?}");
 }
