@@ -9,11 +9,11 @@ use crate::shell::{Step, cargo};
 /// The version of TOPP-RA that is compared with.
 const TOPPRA: &str = "toppra==0.6.10";
 
-/// Builds and runs the peers; the table is written to `target/peers/peers.json`.
+/// Builds and runs the peers; the table is written to `target/peers.json`.
 pub(crate) fn run(root: &Path) -> Step {
-    let target = root.join("target/peers");
+    let target = root.join("target");
     fs::create_dir_all(&target).map_err(|e| format!("{}: {e}", target.display()))?;
-    let python = match python(&target.join("python")) {
+    let python = match python(&target.join("peers-python")) {
         Ok(python) => Some(python),
         Err(reason) => {
             eprintln!("xtask: SKIPPED toppra, it is not compared with: {reason}");
