@@ -19,12 +19,13 @@ pub mod sweep;
 #[cfg(test)]
 mod tests;
 mod window;
+mod zhao;
 
 pub use error::{LimitKind, PathFault, PlanError};
 
 use crate::job::machine::AxisLimits;
 use layout::{Derivatives, Layout, Pieces, strictest};
-use problem::{Plan, Problem, Settings, Solver};
+use problem::{Plan, Problem, Settings, Solver, Windows};
 use rows::RowSource;
 use sweep::Sweep;
 
@@ -149,6 +150,11 @@ impl Attempt<'_> {
     fn solve(&self, layout: &Layout, largest_code: f64, iterations: &mut u64) -> Result<Plan, PlanError> {
         let problem = self.problem;
         let unit = self.sweep.top();
+        let mut refined = layout.clone();
+        if self.settings.windows == Windows::Zhao {
+            zhao::refine(&mut refined, &self.swept(layout));
+        }
+        let layout = &refined;
         let joints = joints(problem, layout);
         let mut source =
             RowSource { problem: *problem, layout, unit, ceiling: CEILING, joint: joints, largest_code };
@@ -210,22 +216,32 @@ impl Attempt<'_> {
         Some(Plan { iterations: *iterations, ..plan })
     }
 
+    /// Largest swept q on each span.
+    fn swept(&self, layout: &Layout) -> Vec<f64> {
+        let path = self.problem.path;
+        let mut hint = 0;
+        (0..layout.spans())
+            .map(|i| self.sweep.largest(layout.start(path, i), layout.start(path, i + 1), &mut hint))
+            .collect()
+    }
+
     /// Control values of minimum time; `None` where rounding alone would break a limit at any speed.
     fn optimise(&self, source: &RowSource, half: &[f64], iterations: &mut u64) -> Option<Vec<f64>> {
         let mut x = start::profile(source);
         let gap = self.settings.relative_gap;
         match self.settings.solver {
-            Solver::InteriorPoint => *iterations += window::solve(source, &mut x, half, gap, self.whole)?,
+            Solver::InteriorPoint => {
+                *iterations += match self.settings.windows {
+                    Windows::Whole => window::solve(source, &mut x, half, gap, usize::MAX)?,
+                    Windows::Overlap => window::solve(source, &mut x, half, gap, self.whole)?,
+                    Windows::Zhao => zhao::solve(source, &mut x, half, gap)?,
+                }
+            }
             Solver::Clarabel => {
-                let (layout, path) = (source.layout, source.problem.path);
-                let mut hint = 0;
-                let swept: Vec<f64> = (1..layout.spans() - 1)
-                    .map(|i| {
-                        let (from, to) = (layout.start(path, i), layout.start(path, i + 1));
-                        self.sweep.largest(from, to, &mut hint) / source.unit
-                    })
-                    .collect();
-                let (answer, count) = clarabel::solve(source, &swept, &x, half, gap)?;
+                let mut swept = self.swept(source.layout);
+                swept.iter_mut().for_each(|q| *q /= source.unit);
+                let inner = &swept[1..swept.len() - 1];
+                let (answer, count) = clarabel::solve(source, inner, &x, half, gap)?;
                 *iterations += count;
                 x = answer;
             }

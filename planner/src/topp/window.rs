@@ -58,7 +58,7 @@ pub(super) fn solve(
 }
 
 /// Solves disjoint stretches that share no row, all from the same `x`.
-fn stage(
+pub(super) fn stage(
     source: &RowSource,
     x: &mut [f64],
     half: &[f64],
@@ -86,7 +86,7 @@ fn stage(
 }
 
 /// Scales the whole profile until its least slack is comfortable everywhere.
-fn scale_all(source: &RowSource, x: &mut [f64], half: &[f64]) -> Option<()> {
+pub(super) fn scale_all(source: &RowSource, x: &mut [f64], half: &[f64]) -> Option<()> {
     let m = x.len();
     for _ in 0..SCALINGS {
         let starts: Vec<usize> = (0..m).step_by(WINDOW / 4).collect();
