@@ -7,6 +7,7 @@
 mod check;
 mod clarabel;
 mod error;
+pub mod horizon;
 mod ipm;
 mod knots;
 mod layout;

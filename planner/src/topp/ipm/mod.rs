@@ -6,6 +6,7 @@ mod block;
 
 use self::band::Band;
 use self::block::{Affine, Rows};
+use super::horizon::Deadline;
 use super::layout::Pieces;
 use super::rows::{CellRows, RowSource, dot};
 
@@ -60,6 +61,8 @@ pub(super) struct Workspace {
     push: Vec<f64>,
     correction: Vec<f64>,
     dc: Vec<f64>,
+    /// When to stop early.
+    pub(super) deadline: Deadline,
 }
 
 impl Workspace {
@@ -184,6 +187,9 @@ impl Workspace {
                 self.best.clone_from(&self.c);
             }
             let gap = self.assemble(dual_step);
+            if self.deadline.passed(iteration) {
+                return iteration;
+            }
             if gap < relative_gap * time && (time - last_time).abs() < relative_gap * time {
                 return iteration;
             }
