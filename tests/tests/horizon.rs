@@ -58,6 +58,26 @@ fn streamed(
             record.commit(&commit);
             let table = record.table(&commit.stop);
             let certificate = certify(&table, limits, caps);
+            if !certificate.holds {
+                let mut at = 0u64;
+                let mut ks = vec![0];
+                for s in &table.steps {
+                    at += u64::from(*s);
+                    ks.push(at);
+                }
+                eprintln!(
+                    "DBG commit steps {} stop {} until {} end {} window {} complete {} breaks end {:?} knots end {} missing {:?}",
+                    commit.steps.len(),
+                    commit.stop.steps.len(),
+                    commit.until,
+                    commit.stop.end,
+                    commit.window,
+                    commit.complete,
+                    table.path.breaks.last(),
+                    at,
+                    table.path.breaks.iter().filter(|b| ks.binary_search(b).is_err()).collect::<Vec<_>>()
+                );
+            }
             assert!(certificate.holds, "commit {}: {certificate:?}", out.commits);
             if let Some((before, old)) = &last {
                 let kept = old.steps.len() - before.stop.steps.len();
@@ -144,4 +164,54 @@ fn caps_that_change_are_kept() {
     let out = streamed(&path, &limits, &caps, HorizonSettings::default(), Deadline::NONE, 2);
     let gap = out.table.duration() / whole(&path, &limits, &caps) - 1.0;
     assert!(gap < 5e-4, "{gap}");
+}
+
+#[test]
+#[ignore]
+fn fuzz() {
+    let mut bad = 0;
+    for seed in
+        std::env::var("SEEDS").unwrap().split(",").map(|s| s.parse::<u64>().unwrap()).collect::<Vec<_>>()
+    {
+        let mut r = Random::new(seed + 1000);
+        let axes = 1 + (seed % 7) as usize;
+        let scale = 10f64.powf(r.between(-2.0, 2.0));
+        let turn = 10f64.powf(r.between(-2.0, 0.3));
+        let spans = 20 + (r.between(0.0, 100.0) as usize);
+        let path = meander(&mut r, axes, spans, scale, turn);
+        let v0 = scale * 10f64.powf(r.between(0.0, 2.0));
+        let (va, aj) = (10f64.powf(r.between(-1.7, 0.0)), 10f64.powf(r.between(-2.3, -1.0)));
+        let l: Vec<AxisLimits> = (0..axes)
+            .map(|_| {
+                let velocity = v0 * r.between(0.5, 2.0);
+                let acceleration = velocity / va * r.between(0.5, 2.0);
+                let jerk =
+                    if seed % 11 == 0 { f64::INFINITY } else { acceleration / aj * r.between(0.5, 2.0) };
+                AxisLimits { velocity, acceleration, jerk }
+            })
+            .collect();
+        let p2 = path.clone();
+        let l2 = l.clone();
+        let res = std::panic::catch_unwind(move || {
+            let out = streamed(&p2, &l2, &[], HorizonSettings::default(), Deadline::NONE, 3);
+            let best = whole(&p2, &l2, &[]);
+            (out.table.duration() / best - 1.0, out.commits, out.table.spans(), out.longest, out.most_window)
+        });
+        match res {
+            Ok((gap, c, n, t, w)) => {
+                if gap > 2e-3 {
+                    bad += 1;
+                    eprintln!("GAP {seed} axes {axes} gap {gap:.2e} commits {c} spans {n} {t:?} {w}");
+                }
+            }
+            Err(e) => {
+                bad += 1;
+                eprintln!(
+                    "FAIL {seed} axes {axes} {:?}",
+                    e.downcast_ref::<String>().map(|s| s[..s.len().min(300)].to_string())
+                );
+            }
+        }
+    }
+    eprintln!("bad {bad}");
 }

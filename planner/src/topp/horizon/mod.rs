@@ -12,6 +12,7 @@
 mod draft;
 mod path;
 mod record;
+mod solve;
 mod window;
 
 use std::time::Instant;
@@ -128,6 +129,8 @@ pub struct Horizon {
     /// q of x = 1, and size of a squared code.
     unit: f64,
     q_scale: f32,
+    /// Where the latest window ended: lasting knots reach close to it [grid steps].
+    end: u64,
     /// Latest braking distance in u.
     braking: f64,
     /// Path length in grid steps from which on another call can commit something.
@@ -177,6 +180,7 @@ impl Horizon {
             unit,
             q_scale: rounding::scale_of(unit * headroom * headroom, rounding::LONG_CODE),
             braking: 0.5 * unit.sqrt() * slowest,
+            end: 0,
             wanted: 0,
             work: Workspace::default(),
         })
