@@ -9,6 +9,7 @@ use planner::geometry::section::{FeedCap, SpeedCap};
 use planner::job::machine::AxisLimits;
 use planner::topp::horizon::{Commit, Deadline, Horizon, HorizonSettings, Record, pieces};
 use planner::topp::problem::{Problem, Settings, Windows};
+use proptest::prelude::*;
 use tests::meander::{limits, meander};
 use tests::tables::Random;
 
@@ -58,26 +59,6 @@ fn streamed(
             record.commit(&commit);
             let table = record.table(&commit.stop);
             let certificate = certify(&table, limits, caps);
-            if !certificate.holds {
-                let mut at = 0u64;
-                let mut ks = vec![0];
-                for s in &table.steps {
-                    at += u64::from(*s);
-                    ks.push(at);
-                }
-                eprintln!(
-                    "DBG commit steps {} stop {} until {} end {} window {} complete {} breaks end {:?} knots end {} missing {:?}",
-                    commit.steps.len(),
-                    commit.stop.steps.len(),
-                    commit.until,
-                    commit.stop.end,
-                    commit.window,
-                    commit.complete,
-                    table.path.breaks.last(),
-                    at,
-                    table.path.breaks.iter().filter(|b| ks.binary_search(b).is_err()).collect::<Vec<_>>()
-                );
-            }
             assert!(certificate.holds, "commit {}: {certificate:?}", out.commits);
             if let Some((before, old)) = &last {
                 let kept = old.steps.len() - before.stop.steps.len();
@@ -166,52 +147,29 @@ fn caps_that_change_are_kept() {
     assert!(gap < 5e-4, "{gap}");
 }
 
-#[test]
-#[ignore]
-fn fuzz() {
-    let mut bad = 0;
-    for seed in
-        std::env::var("SEEDS").unwrap().split(",").map(|s| s.parse::<u64>().unwrap()).collect::<Vec<_>>()
-    {
-        let mut r = Random::new(seed + 1000);
-        let axes = 1 + (seed % 7) as usize;
-        let scale = 10f64.powf(r.between(-2.0, 2.0));
-        let turn = 10f64.powf(r.between(-2.0, 0.3));
-        let spans = 20 + (r.between(0.0, 100.0) as usize);
-        let path = meander(&mut r, axes, spans, scale, turn);
-        let v0 = scale * 10f64.powf(r.between(0.0, 2.0));
-        let (va, aj) = (10f64.powf(r.between(-1.7, 0.0)), 10f64.powf(r.between(-2.3, -1.0)));
-        let l: Vec<AxisLimits> = (0..axes)
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 16, max_shrink_iters: 4, ..ProptestConfig::default() })]
+
+    /// Any smooth path under limits that fit each other: every commitment is a certified plan, and the whole is near
+    /// the fastest motion.
+    #[test]
+    fn random_paths_and_limits(seed in any::<u64>(), axes in 1usize..7, spans in 20usize..90) {
+        let mut random = Random::new(seed);
+        let scale = random.scale(0.01, 100.0);
+        let turn = random.scale(0.01, 2.0);
+        let path = meander(&mut random, axes, spans, scale, turn);
+        let velocity = scale * random.scale(1.0, 100.0);
+        let (speed_ramp, ramp) = (random.scale(0.02, 1.0), random.scale(0.005, 0.1));
+        let limits: Vec<AxisLimits> = (0..axes)
             .map(|_| {
-                let velocity = v0 * r.between(0.5, 2.0);
-                let acceleration = velocity / va * r.between(0.5, 2.0);
-                let jerk =
-                    if seed % 11 == 0 { f64::INFINITY } else { acceleration / aj * r.between(0.5, 2.0) };
-                AxisLimits { velocity, acceleration, jerk }
+                let velocity = velocity * random.between(0.5, 2.0);
+                let acceleration = velocity / speed_ramp * random.between(0.5, 2.0);
+                AxisLimits { velocity, acceleration, jerk: acceleration / ramp * random.between(0.5, 2.0) }
             })
             .collect();
-        let p2 = path.clone();
-        let l2 = l.clone();
-        let res = std::panic::catch_unwind(move || {
-            let out = streamed(&p2, &l2, &[], HorizonSettings::default(), Deadline::NONE, 3);
-            let best = whole(&p2, &l2, &[]);
-            (out.table.duration() / best - 1.0, out.commits, out.table.spans(), out.longest, out.most_window)
-        });
-        match res {
-            Ok((gap, c, n, t, w)) => {
-                if gap > 2e-3 {
-                    bad += 1;
-                    eprintln!("GAP {seed} axes {axes} gap {gap:.2e} commits {c} spans {n} {t:?} {w}");
-                }
-            }
-            Err(e) => {
-                bad += 1;
-                eprintln!(
-                    "FAIL {seed} axes {axes} {:?}",
-                    e.downcast_ref::<String>().map(|s| s[..s.len().min(300)].to_string())
-                );
-            }
-        }
+        let out = streamed(&path, &limits, &[], HorizonSettings::default(), Deadline::NONE, 3);
+        // Other knots than the whole path's, so this is no measure of the lookahead alone.
+        let ratio = out.table.duration() / whole(&path, &limits, &[]);
+        prop_assert!(ratio < 1.05, "{ratio}");
     }
-    eprintln!("bad {bad}");
 }

@@ -186,7 +186,8 @@ fn improve(
         };
         let kept = draft.lasting.min(n - 1);
         let carried = carried[..kept.max(commit.min(n - 1))].to_vec();
-        draft.improved = improved.min(carried.len());
+        // An earlier window may have gone further.
+        draft.improved = improved.max(draft.improved).min(carried.len());
         horizon.draft = Draft { carried, ..draft };
         (horizon.committed, horizon.complete) = (commit, complete);
         horizon.end = origin + reach.end;
