@@ -54,7 +54,10 @@ impl Start<'_> {
             let Some(&fast) = carried.get(i) else { return slow };
             let drawn =
                 if i < self.committed { 0.0 } else { drawn * share(i + 1, self.committed, self.commit) };
-            let left = share(i, *improved, carried.len()).max(drawn);
+            // Motion carried up to the end of the path needs nothing to go on with.
+            let crawling =
+                if carried.len() > self.crawl.len() { 0.0 } else { share(i, *improved, carried.len()) };
+            let left = crawling.max(drawn);
             (1.0 - left) * fast + left * slow
         };
         self.crawl.iter().enumerate().map(blend).collect()
@@ -87,16 +90,19 @@ impl<'a> Window<'a> {
         });
         let work = &mut horizon.work;
         let beyond = Stretch { from: draft.improved.max(1) - 1, to: m };
+        let fastest = crawl.clone();
         for _ in 0..CRAWLS {
             start.crawl = self.gaining(&crawl);
             let x = start.at(0.0);
             // The motion carried ends with next to no slack: only what follows it is scaled.
             work.load(source, &x, &start.half, beyond, |_| 0.0);
             if work.settle() > if beyond.from == 0 { START_SLACK } else { 0.0 } {
-                break;
+                return start;
             }
             crawl.iter_mut().for_each(|q| *q *= 0.8);
         }
+        // It is not the crawl that is too fast: what the rounded motion amounts to decides.
+        start.crawl = self.gaining(&fastest);
         start
     }
 
@@ -170,10 +176,18 @@ impl<'a> Window<'a> {
         fast: &[f64],
     ) -> Result<(FeedTable, Vec<f64>), PlanError> {
         let mut fault = None;
-        for share in SHARES {
-            let x: Vec<f64> = slow.iter().zip(fast).map(|(s, f)| s + share * (f - s)).collect();
+        // What is committed keeps its speed if slowing down more gently after it is enough.
+        let gentler = SHARES.map(|left| [1.0, left]);
+        for [before, after] in gentler.into_iter().chain(SHARES.map(|left| [left, left])) {
+            let x: Vec<f64> = (1..)
+                .zip(slow.iter().zip(fast))
+                .map(|(i, (s, f))| {
+                    let left = before + (after - before) * share(i, self.commit, self.improved);
+                    s + left * (f - s)
+                })
+                .collect();
             let table = rounding::table(self.source, horizon.q_scale, &x);
-            if share > 0.0 && self.divided(&table).is_some() {
+            if before > 0.0 && self.divided(&table).is_some() {
                 continue;
             }
             match self.rounded(horizon, &table, &x) {
