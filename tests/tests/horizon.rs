@@ -103,15 +103,6 @@ fn streamed_paths_lose_almost_nothing() {
         let out = streamed(&path, &limits, &[], HorizonSettings::default(), Deadline::NONE, 3);
         let best = whole(&path, &limits, &[]);
         let gap = out.table.duration() / best - 1.0;
-        eprintln!(
-            "{} spans, {} commits, gap {gap:.2e}, longest {:?}, window {}, first after {:?}, kept {}",
-            out.table.spans(),
-            out.commits,
-            out.longest,
-            out.most_window,
-            out.first_output,
-            out.most_kept
-        );
         assert!(gap < 5e-4, "seed {seed}: {gap}");
         assert!(out.commits > 3 && out.first_output.unwrap() < spans && out.most_kept < spans);
     }

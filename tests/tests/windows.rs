@@ -23,7 +23,6 @@ fn splices_and_overlaps_come_close_to_the_whole() {
         let whole = planned(&problem, Windows::Whole).table.duration();
         let overlap = planned(&problem, Windows::Overlap).table.duration();
         let zhao = planned(&problem, Windows::Zhao).table.duration();
-        eprintln!("{whole} overlap {:.2e} zhao {:.2e}", overlap / whole - 1.0, zhao / whole - 1.0);
         assert!((overlap / whole - 1.0).abs() < 2e-5, "{overlap} {whole}");
         // Its splices end at 0.5 % less speed than allowed, three places per segment.
         assert!((-1e-5..1e-3).contains(&(zhao / whole - 1.0)), "{zhao} {whole}");

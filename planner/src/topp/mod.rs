@@ -13,6 +13,7 @@ mod knots;
 mod layout;
 pub mod problem;
 mod rest;
+pub mod retime;
 mod rounding;
 mod rows;
 mod start;

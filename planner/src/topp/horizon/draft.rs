@@ -11,20 +11,20 @@ const MOST_UNEVEN: u32 = 4;
 
 /// Spans from the first kept geometry knot to the end of the window, in grid steps from there.
 #[derive(Clone, Debug)]
-pub(super) struct Draft {
-    pub(super) knots: Vec<u64>,
-    pub(super) cells: Vec<u8>,
+pub(in crate::topp) struct Draft {
+    pub(in crate::topp) knots: Vec<u64>,
+    pub(in crate::topp) cells: Vec<u8>,
     /// Control values of the first spans, as x; that of span 0 means nothing.
-    pub(super) carried: Vec<f64>,
+    pub(in crate::topp) carried: Vec<f64>,
     /// Spans whose control values were improved; those carried after them are at the crawl.
-    pub(super) improved: usize,
+    pub(in crate::topp) improved: usize,
     /// Spans that stay; those after them only serve to stop at the end of the window.
-    pub(super) lasting: usize,
+    pub(in crate::topp) lasting: usize,
 }
 
 impl Draft {
     /// Keeps `self`'s lasting spans and continues with the placed ones; those that end by `until` will last.
-    pub(super) fn continued(&self, path: &GridPath, placed: &Layout, until: u64) -> Draft {
+    pub(in crate::topp) fn continued(&self, path: &GridPath, placed: &Layout, until: u64) -> Draft {
         let mut knots = self.knots[..=self.lasting].to_vec();
         let mut cells = self.cells[..self.lasting].to_vec();
         let kept = knots[self.lasting];
@@ -44,14 +44,19 @@ impl Draft {
         Draft { knots, cells, carried, improved, lasting: lasting.max(self.lasting) }
     }
 
-    pub(super) fn layout(&self, path: &GridPath) -> Layout {
+    pub(in crate::topp) fn layout(&self, path: &GridPath) -> Layout {
         let mut layout = Layout::new(path, self.knots.clone());
         layout.cells.clone_from(&self.cells);
         layout
     }
 
     /// Divides spans from `first` on; the error is a span too short for that. The motion carried stays what it is.
-    pub(super) fn divide(&mut self, source: &RowSource, parts: &[u32], first: usize) -> Result<(), usize> {
+    pub(in crate::topp) fn divide(
+        &mut self,
+        source: &RowSource,
+        parts: &[u32],
+        first: usize,
+    ) -> Result<(), usize> {
         let parts = graded(&source.layout.h, parts, first);
         let carried = self.carried.len();
         let (mut knots, mut cells) = (vec![0], Vec::new());

@@ -25,7 +25,7 @@ use super::error::PathFault;
 use super::ipm::Workspace;
 use super::rounding;
 use crate::job::machine::AxisLimits;
-use draft::Draft;
+pub(super) use draft::Draft;
 use path::Arrived;
 
 /// How far ahead to look, and how much to commit at a time.
