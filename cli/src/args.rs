@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::failure::Failure;
+
 /// Fastest motion within a machine's limits, as a table for its drives.
 #[derive(Debug, Parser)]
 #[command(name = "feedspline", version, about, after_help = EXIT_CODES)]
@@ -25,6 +27,10 @@ pub enum Verb {
     Plan(PlanArgs),
     /// Plan a job and play its table on simulated drives
     Run(RunArgs),
+    /// Plan a job by several methods and show them side by side
+    Compare(CompareArgs),
+    /// Write a sample way-point job
+    Sample(SampleArgs),
     /// Prove a feed table against the limits it carries
     Verify(VerifyArgs),
     /// Show what is in a feed table
@@ -46,6 +52,8 @@ impl Verb {
         match self {
             Verb::Plan(args) => args.speech.talk(),
             Verb::Run(args) => args.plan.speech.talk(),
+            Verb::Compare(args) => args.speech.talk(),
+            Verb::Sample(args) => args.speech.talk(),
             Verb::Verify(args) => args.speech.talk(),
             Verb::Inspect(args) => args.speech.talk(),
         }
@@ -69,12 +77,12 @@ impl Speech {
     }
 }
 
-/// `feedspline plan`.
+/// A job, and how it is read.
 #[derive(Args, Clone, Debug)]
-#[command(after_help = "Example: feedspline plan part.ngc --machine mill.toml --tolerance 0.005 -o out/part")]
-pub struct PlanArgs {
-    /// The part program
-    pub job: PathBuf,
+pub struct JobArgs {
+    /// The part program, or a .csv file of way-points
+    #[arg(value_name = "JOB")]
+    pub file: PathBuf,
     /// Machine file; a built-in 3-axis mill without it
     #[arg(long, value_name = "FILE")]
     pub machine: Option<PathBuf>,
@@ -87,21 +95,111 @@ pub struct PlanArgs {
     /// Ignore programmed feeds: only the machine limits the speed
     #[arg(long)]
     pub ignore_feed: bool,
-    /// Axis limits to keep: velocity and acceleration, or jerk as well
-    #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
-    pub limits: Limits,
-    /// How to read the program
-    #[arg(long, value_enum, default_value_t, value_name = "NAME")]
-    pub dialect: Dialect,
-    /// Which solver finds the motion
-    #[arg(long, value_enum, default_value_t, value_name = "NAME")]
-    pub solver: Solver,
+    /// How to read the program [default: rs274]
+    #[arg(long, value_enum, value_name = "NAME")]
+    pub dialect: Option<Dialect>,
+    /// Ends of the spline through way-points [default: not-a-knot]
+    #[arg(long, value_enum, value_name = "ENDS")]
+    pub spline: Option<Ends>,
+    /// How the spline's parameter is spread over way-points [default: chord]
+    #[arg(long, value_enum, value_name = "RULE")]
+    pub knots: Option<Knots>,
+    /// Feed of a way-point job [mm/min; deg or rad per min without a linear axis]; none without it
+    #[arg(long, value_name = "F", value_parser = feed, allow_negative_numbers = true)]
+    pub feed: Option<f64>,
     /// Worker threads [default: one per core]; the result does not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub threads: Option<u16>,
+}
+
+impl JobArgs {
+    /// Whether the job is a file of way-points, by its name.
+    pub fn way_points(&self) -> bool {
+        self.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"))
+    }
+
+    /// Refuses options that mean nothing for a job of this kind.
+    ///
+    /// # Errors
+    /// Names the first of them.
+    pub fn check(&self) -> Result<(), Failure> {
+        let for_points = [
+            ("--spline", self.spline.is_some()),
+            ("--knots", self.knots.is_some()),
+            ("--feed", self.feed.is_some()),
+        ];
+        let for_programs = [
+            ("--tolerance", self.tolerance.is_some()),
+            ("--ignore-feed", self.ignore_feed),
+            ("--dialect", self.dialect.is_some()),
+        ];
+        let given = |options: [(&'static str, bool); 3]| options.into_iter().find(|o| o.1).map(|o| o.0);
+        let (option, kind, help) = if self.way_points() {
+            (
+                given(for_programs),
+                "a file of way-points",
+                "The path runs through the way-points themselves. Leave the option away.",
+            )
+        } else {
+            (
+                given(for_points),
+                "a part program",
+                "Files of way-points end in .csv. Leave the option away, or rename the file if it is one.",
+            )
+        };
+        match option {
+            Some(option) => Err(Failure::input(format!("{option} says nothing about {kind}"))
+                .in_file(&self.file)
+                .with_help(help)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// `feedspline plan`.
+#[derive(Args, Clone, Debug)]
+#[command(after_help = "Example: feedspline plan part.ngc --machine mill.toml --tolerance 0.005 -o out/part
+         feedspline plan points.csv --spline not-a-knot --knots uniform --limits va")]
+pub struct PlanArgs {
+    /// What to plan.
+    #[command(flatten)]
+    pub job: JobArgs,
+    /// Axis limits to keep: velocity and acceleration, or jerk as well [default: vaj]
+    #[arg(long, value_enum, value_name = "WHICH")]
+    pub limits: Option<Limits>,
+    /// How jerk is limited; none is --limits va [default: true]
+    #[arg(long, value_enum, value_name = "FORM")]
+    pub jerk: Option<Jerk>,
+    /// How long paths are divided
+    #[arg(long, value_enum, default_value_t, value_name = "HOW")]
+    pub windows: Windows,
+    /// Which solver finds the motion
+    #[arg(long, value_enum, default_value_t, value_name = "NAME")]
+    pub solver: Solver,
     /// What to say.
     #[command(flatten)]
     pub speech: Speech,
+}
+
+impl PlanArgs {
+    /// How jerk is limited, whichever option says so.
+    ///
+    /// # Errors
+    /// The two options contradict each other.
+    pub fn jerk_form(&self) -> Result<Jerk, Failure> {
+        match (self.limits, self.jerk) {
+            (Some(Limits::Va), Some(Jerk::True | Jerk::Pseudo)) => {
+                Err(Failure::input("--limits va leaves jerk out, --jerk asks for it")
+                    .with_help("Leave one of the two options away."))
+            }
+            (Some(Limits::Vaj), Some(Jerk::None)) => {
+                Err(Failure::input("--limits vaj limits jerk, --jerk none leaves it out")
+                    .with_help("Leave one of the two options away."))
+            }
+            (Some(Limits::Va), _) => Ok(Jerk::None),
+            (_, form) => Ok(form.unwrap_or_default()),
+        }
+    }
 }
 
 /// `feedspline run`.
@@ -114,6 +212,46 @@ pub struct RunArgs {
     /// Write every N-th set-point to trace.csv [default: so that about 200 000 rows are kept]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub trace_every: Option<u32>,
+}
+
+/// `feedspline compare`.
+#[derive(Args, Clone, Debug)]
+#[command(after_help = "\
+The feed moves of the job are planned by one method after the other, on the same path and under the same limits. Rapids
+and waits are left out.
+
+Example: feedspline compare jobs/cat2d.csv --machine jobs/compact3.toml --methods whole,zhao,overlap,constant-feed")]
+pub struct CompareArgs {
+    /// What to plan.
+    #[command(flatten)]
+    pub job: JobArgs,
+    /// Methods, separated by commas [default: all; clarabel on short paths only]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    pub methods: Vec<Method>,
+    /// What to say.
+    #[command(flatten)]
+    pub speech: Speech,
+}
+
+/// `feedspline sample`.
+#[derive(Args, Clone, Debug)]
+#[command(after_help = "Example: feedspline sample tooth --rows 1000 --points 100 -o out/tooth.csv")]
+pub struct SampleArgs {
+    /// Which one
+    #[arg(value_enum)]
+    pub what: Sample,
+    /// Way-points in all, or of each row [default: 3000 for the cat, 100 for the tooth]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
+    pub points: Option<u32>,
+    /// Rows of the tooth [default: 1000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub rows: Option<u32>,
+    /// The file to write; out/ and the sample's name without it
+    #[arg(long, short, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// What to say.
+    #[command(flatten)]
+    pub speech: Speech,
 }
 
 /// `feedspline verify`.
@@ -141,13 +279,94 @@ pub struct InspectArgs {
 }
 
 /// Which axis limits a plan keeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Limits {
     /// Velocity and acceleration
     Va,
     /// Velocity, acceleration and jerk
-    #[default]
     Vaj,
+}
+
+/// How jerk is limited.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Jerk {
+    /// The jerk of every axis, as it is
+    #[default]
+    True,
+    /// The linear form of Zhao 2016, eq. 3.4: stricter than it has to be
+    Pseudo,
+    /// Not at all
+    None,
+}
+
+/// How long paths are divided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Windows {
+    /// Windows side by side, then once more round their joints
+    #[default]
+    Overlap,
+    /// Not at all
+    Whole,
+    /// Spliced where the motion is slow, as in Zhao 2016, sec. 3.2
+    Zhao,
+}
+
+/// What closes the spline at its ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Ends {
+    /// The third derivative is continuous one way-point from the ends
+    #[default]
+    NotAKnot,
+    /// The path sets out along the first chord and arrives along the last
+    Clamped,
+    /// The second derivative is zero
+    Natural,
+    /// A closed curve without a seam
+    Periodic,
+}
+
+/// How the spline's parameter is spread over the way-points.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Knots {
+    /// Alike between any two
+    Uniform,
+    /// By their distance
+    #[default]
+    Chord,
+    /// By the square root of their distance
+    Centripetal,
+}
+
+/// The ways to plan that can be compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum Method {
+    /// True jerk, the path in one piece
+    Whole,
+    /// True jerk, spliced where the motion is slow
+    Zhao,
+    /// True jerk, windows side by side, then once more round their joints
+    Overlap,
+    /// One speed all along the path
+    ConstantFeed,
+    /// The linear form of the jerk limit
+    PseudoJerk,
+    /// Velocity and acceleration only
+    NoJerk,
+    /// Velocity and acceleration by the sweep alone: its time, no table
+    Sweep,
+    /// Clarabel on a sequence of linear programmes
+    Clarabel,
+    /// Limits asked for in the middle of each span only; not certified
+    Collocation,
+}
+
+/// Samples of way-points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Sample {
+    /// The outline of a cat, X and Y
+    Cat,
+    /// A zigzag over a tooth, X, Y and Z
+    Tooth,
 }
 
 /// How a program is read.
@@ -170,6 +389,11 @@ pub enum Solver {
     Clarabel,
 }
 
+/// The name of a choice, as on the command line.
+pub fn name(choice: impl ValueEnum) -> String {
+    choice.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
 fn tolerance(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(mm) if mm.is_finite() && mm >= 0.0 => Ok(mm),
@@ -178,72 +402,13 @@ fn tolerance(text: &str) -> Result<f64, String> {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use clap::CommandFactory;
-
-    fn plan(words: &[&str]) -> Result<PlanArgs, clap::Error> {
-        let words = ["feedspline", "plan"].iter().chain(words);
-        match Cli::try_parse_from(words)?.verb {
-            Verb::Plan(args) => Ok(args),
-            other => panic!("{other:?}"),
-        }
-    }
-
-    #[test]
-    fn command_line_is_consistent() {
-        Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn every_verb_shows_an_example_of_itself() {
-        for verb in Cli::command().get_subcommands_mut() {
-            let example = format!("Example: feedspline {} ", verb.get_name());
-            assert!(verb.render_help().to_string().contains(&example), "{example}");
-        }
-    }
-
-    #[test]
-    fn defaults_are_jerk_limited_rs274() {
-        let args = plan(&["a.ngc"]).unwrap();
-        assert_eq!(
-            (args.limits, args.dialect, args.solver),
-            (Limits::Vaj, Dialect::Rs274, Solver::InteriorPoint)
-        );
-        assert!(
-            args.machine.is_none() && args.out.is_none() && args.tolerance.is_none() && !args.ignore_feed
-        );
-    }
-
-    #[test]
-    fn every_option_is_read() {
-        let words = "a.ngc --machine m.toml -o d --tolerance 0.02 --ignore-feed --limits va --dialect printer \
-                     --solver clarabel --threads 3 --json --quiet";
-        let args = plan(&words.split_whitespace().collect::<Vec<_>>()).unwrap();
-        assert_eq!(args.machine, Some("m.toml".into()));
-        assert_eq!(args.out, Some("d".into()));
-        assert_eq!(args.tolerance, Some(0.02));
-        assert_eq!(
-            (args.limits, args.dialect, args.solver),
-            (Limits::Va, Dialect::Printer, Solver::Clarabel)
-        );
-        assert_eq!(args.threads, Some(3));
-        assert!(args.ignore_feed && args.speech.json && args.speech.quiet);
-    }
-
-    #[test]
-    fn tolerances_that_are_no_length_are_refused() {
-        for bad in ["-0.1", "nan", "inf", "wide", ""] {
-            assert!(plan(&["a.ngc", &format!("--tolerance={bad}")]).is_err(), "{bad}");
-        }
-        assert_eq!(plan(&["a.ngc", "--tolerance", "0"]).unwrap().tolerance, Some(0.0));
-    }
-
-    #[test]
-    fn trace_every_starts_at_one() {
-        let run = |n: &str| Cli::try_parse_from(["feedspline", "run", "a.ngc", "--trace-every", n]);
-        assert!(run("1").is_ok());
-        assert!(run("0").is_err());
+fn feed(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(feed) if feed.is_finite() && feed > 0.0 => Ok(feed),
+        Ok(_) => Err("a feed is a finite speed above zero, in millimetres per minute".into()),
+        Err(_) => Err("not a number; give millimetres per minute, such as 1500".into()),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,11 +3,11 @@
 use std::io::Write;
 use std::path::Path;
 
-use crate::args::{PlanArgs, RunArgs};
+use crate::args::{CompareArgs, PlanArgs, RunArgs};
 use crate::failure::Failure;
-use crate::json::{InspectJson, PlanJson, VerifyJson};
+use crate::json::{CompareJson, InspectJson, PlanJson, VerifyJson};
 use crate::progress::Progress;
-use crate::report::model::Report;
+use crate::report::model::{Axis, Motion, Report};
 
 /// A planned job, and everything there is to tell of it.
 #[derive(Clone, Debug)]
@@ -18,6 +18,17 @@ pub struct Outcome {
     pub report: Report,
     /// The feed table file.
     pub feed: Vec<u8>,
+}
+
+/// One job, planned by several methods.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// The numbers; `files` is filled in when they are written.
+    pub json: CompareJson,
+    /// The axes, in the machine's order.
+    pub axes: Vec<Axis>,
+    /// The motion of each method in `json`; `None` where there is none.
+    pub motions: Vec<Option<Motion>>,
 }
 
 /// The work behind the verbs.
@@ -34,6 +45,12 @@ pub trait Engine {
     /// As [`Engine::plan`], or a drive refuses the table, or `trace` cannot be written.
     fn run(&self, args: &RunArgs, trace: &mut dyn Write, progress: &mut Progress)
     -> Result<Outcome, Failure>;
+
+    /// Plans a job by several methods.
+    ///
+    /// # Errors
+    /// Bad input, or no method finds a motion.
+    fn compare(&self, args: &CompareArgs, progress: &mut Progress) -> Result<Compared, Failure>;
 
     /// Proves a feed table file against the limits it carries.
     ///

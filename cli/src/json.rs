@@ -9,11 +9,19 @@ use serde::Serialize;
 
 use crate::failure::{Blame, Failure};
 
+mod compare;
+
+pub use compare::{CompareFilesJson, CompareJson, MethodJson, MethodState};
+
 /// The object of `plan` and `run`, also written as plan.json.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanJson {
-    /// The part program as given on the command line.
+    /// The job as given on the command line.
     pub job: String,
+    /// `program` or `way-points`.
+    pub job_kind: &'static str,
+    /// The way-points and the spline through them; null for a part program.
+    pub way_points: Option<WayPointsJson>,
     /// Name of the machine.
     pub machine: String,
     /// Axes in the machine's order.
@@ -70,8 +78,14 @@ pub struct PlanJson {
     pub peak_memory_mib: Option<f64>,
     /// Name of the solver.
     pub solver: String,
+    /// How jerk is limited: `true`, `pseudo` or `none`.
+    pub jerk_form: String,
+    /// How long paths are divided: `overlap`, `whole` or `zhao`.
+    pub windows: String,
     /// Its iterations, all sections together.
     pub iterations: u64,
+    /// What it left at most, as a share of the motion time; null when it cannot tell.
+    pub gap_estimate: Option<f64>,
     /// The proof.
     pub certificate: CertificateJson,
     /// The simulated motion; only `run` has it.
@@ -81,6 +95,17 @@ pub struct PlanJson {
     pub notes: Vec<NoteJson>,
     /// Files written, by their role.
     pub files: FilesJson,
+}
+
+/// Way-points and the spline through them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WayPointsJson {
+    /// How many.
+    pub count: u64,
+    /// What closes the spline at its ends: `not-a-knot`, `clamped`, `natural` or `periodic`.
+    pub ends: String,
+    /// How its parameter is spread: `uniform`, `chord` or `centripetal`.
+    pub knots: String,
 }
 
 /// One axis.
@@ -298,6 +323,17 @@ pub struct InspectAxisJson {
     pub end_counts: i64,
     /// Its own part of the tables [bytes].
     pub bytes: u64,
+}
+
+/// The object of `sample`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SampleJson {
+    /// The file written.
+    pub file: String,
+    /// Way-points in it.
+    pub points: u64,
+    /// Its size [bytes].
+    pub file_bytes: u64,
 }
 
 /// What `--json` prints when a verb fails.

@@ -56,6 +56,8 @@ pub fn status(
     let result = match &cli.verb {
         Verb::Plan(args) => verbs::plan::execute(args, engine, &mut console),
         Verb::Run(args) => verbs::run::execute(args, engine, &mut console),
+        Verb::Compare(args) => verbs::compare::execute(args, engine, &mut console),
+        Verb::Sample(args) => verbs::sample::execute(args, &mut console),
         Verb::Verify(args) => verbs::verify::execute(args, engine, &mut console),
         Verb::Inspect(args) => verbs::inspect::execute(args, engine, &mut console),
     };

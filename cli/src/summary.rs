@@ -1,24 +1,29 @@
 //! What a verb prints for people: one aligned column of names, one of values.
 
-use crate::json::{BusJson, CertificateJson, InspectJson, PlanJson, VerifyJson};
+use crate::json::{
+    BusJson, CertificateJson, CompareJson, InspectJson, MethodJson, MethodState, PlanJson, SampleJson,
+    VerifyJson,
+};
+use crate::report::compare::{change, seconds};
 use crate::report::words::{bytes, count, duration, length, percent, times};
 
 /// The summary of `plan` and `run`.
 pub fn plan(p: &PlanJson) -> String {
     let mut s = Sheet::new(&format!("{} on {}", p.job, p.machine));
-    let mut kinds = vec![format!("{} lines", count(p.lines)), format!("{} arcs", count(p.arcs))];
-    if p.splines > 0 {
-        kinds.push(format!("{} splines", count(p.splines)));
+    if let Some(points) = &p.way_points {
+        let (ends, knots) = (&points.ends, &points.knots);
+        s.row("way-points", &format!("{}, {ends} spline, {knots} knots", count(points.count)));
+    } else {
+        s.row("program", &blocks(p));
     }
-    kinds.push(format!("{} rapids", count(p.rapids)));
-    s.row("program", &format!("{} blocks: {}", count(p.blocks), kinds.join(", ")));
     s.row("length", &format!("{} feed, {} rapid", length(p.feed_length_mm), length(p.rapid_length_mm)));
     s.row("stops", &format!("{}, {} dwells", count(p.stops), count(p.dwells)));
     s.row("cycle time", &format!("{} ({} in motion)", duration(p.cycle_time_s), duration(p.motion_time_s)));
     s.row("at constant feed", &duration(p.constant_feed_time_s));
     if let Some(stop) = p.stop_every_block_time_s {
         let gain = if p.motion_time_s > 0.0 { stop / p.motion_time_s } else { 1.0 };
-        s.row("stop at each block", &format!("{} ({} as long)", duration(stop), times(gain)));
+        let name = if p.way_points.is_some() { "stop at each point" } else { "stop at each block" };
+        s.row(name, &format!("{} ({} as long)", duration(stop), times(gain)));
     }
     let (bound, allowed) = (p.max_deviation_mm, p.tolerance_mm);
     s.row("deviation", &format!("{bound:.4} mm of {allowed} mm allowed ({})", p.tolerance_source));
@@ -50,6 +55,70 @@ pub fn plan(p: &PlanJson) -> String {
     if let Some(report) = &p.files.report {
         s.row("report", report);
     }
+    s.text
+}
+
+fn blocks(p: &PlanJson) -> String {
+    let mut kinds = vec![format!("{} lines", count(p.lines)), format!("{} arcs", count(p.arcs))];
+    if p.splines > 0 {
+        kinds.push(format!("{} splines", count(p.splines)));
+    }
+    kinds.push(format!("{} rapids", count(p.rapids)));
+    format!("{} blocks: {}", count(p.blocks), kinds.join(", "))
+}
+
+/// The table of `compare`.
+pub fn compare(c: &CompareJson) -> String {
+    let mut s = Sheet::new(&format!("{} on {}", c.job, c.machine));
+    let threads = if c.threads == 1 { "1 thread".into() } else { format!("{} threads", c.threads) };
+    s.row("path", &format!("{} in {} spans, {threads}", length(c.feed_length_mm), count(c.geometry_spans)));
+    let columns = |cells: [&str; 9]| {
+        let [computing, traverse, change, certified, v, a, j, spans, iterations] = cells;
+        let text = format!(
+            "{computing:<10} {traverse:>14} {change:>12}  {certified:<10}{v:>8} {a:>8} {j:>9} {spans:>9} {iterations:>10}"
+        );
+        text.trim_end().to_owned()
+    };
+    let heads = ["computing", "traverse", "on whole", "certified", "v", "a", "j", "spans", "iterations"];
+    s.row("method", &columns(heads));
+    for m in &c.methods {
+        let text = match (&m.remark, m.state) {
+            (Some(remark), MethodState::LeftOut) => format!("left out: {remark}"),
+            (Some(remark), _) => format!("no motion: {remark}"),
+            (None, _) => columns(cells(m).each_ref().map(String::as_str)),
+        };
+        s.row(&m.method, &text);
+    }
+    if let Some(speed) = c.methods.iter().find_map(|m| m.constant_feed_mm_s) {
+        s.row("constant feed", &format!("{speed:.3} mm/s, the largest that keeps all limits all along"));
+    }
+    if let Some(report) = &c.files.report {
+        s.row("report", report);
+    }
+    s.text
+}
+
+fn cells(m: &MethodJson) -> [String; 9] {
+    let some = |value: Option<String>| value.unwrap_or_else(|| "\u{2013}".into());
+    let ratio = |value: Option<f64>| some(value.map(|r| format!("{r:.4}")));
+    [
+        some(m.compute_seconds.map(seconds)),
+        some(m.traverse_time_s.map(duration)),
+        some(m.over_whole.map(change)),
+        some(m.certified.map(|c| if c { "yes" } else { "NO" }.into())),
+        ratio(m.velocity_ratio),
+        ratio(m.acceleration_ratio),
+        ratio(m.jerk_ratio),
+        some(m.spans.map(count)),
+        some(m.iterations.map(count)),
+    ]
+}
+
+/// The summary of `sample`.
+pub fn sample(written: &SampleJson) -> String {
+    let mut s = Sheet::new(&written.file);
+    s.row("way-points", &count(written.points));
+    s.row("size", &bytes(written.file_bytes));
     s.text
 }
 

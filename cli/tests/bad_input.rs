@@ -250,6 +250,72 @@ fn folders_that_cannot_hold_results() {
     assert_eq!(fs::read(home.path().join("file")).unwrap(), b"mine");
 }
 
+/// A file of way-points with this text is refused by every verb that reads jobs.
+fn points_refused(text: impl AsRef<[u8]>, words: &[&str], place: Option<(u64, u64)>, message: &str) {
+    let home = tempfile::tempdir().unwrap();
+    fs::write(home.path().join("points.csv"), text).unwrap();
+    for verb in ["plan", "run", "compare"] {
+        let words = [&[verb, "points.csv", "-o", "out/deep"], words].concat();
+        refused(home.path(), &words, Blamed { file: "points.csv", place, message });
+    }
+}
+
+#[test]
+fn files_of_way_points_that_are_none() {
+    let row = |k: u32| format!("{k},0\n");
+    points_refused("", &[], None, "holds nothing");
+    points_refused("# only this\n\n", &[], None, "holds nothing");
+    points_refused(vec![0; 6 << 20], &[], Some((1, 1)), "longer than");
+    points_refused(noise(5, 50_000), &[], Some((1, 1)), "");
+    points_refused("1,2\n3,4\n", &[], Some((1, 1)), "header is missing");
+    points_refused("X;Y\n1;2\n", &[], Some((1, 1)), "not an axis");
+    points_refused("X,W\n1,2\n", &[], Some((1, 3)), "not an axis");
+    points_refused("X,X\n1,2\n", &[], Some((1, 3)), "two columns");
+    points_refused("X [deg],Y\n1,2\n", &[], Some((1, 1)), "linear");
+    points_refused("X,Y\n1,2\n3\n", &[], Some((3, 1)), "1 fields, the header has 2");
+    points_refused("X,Y\n1,2\n3,4,5\n", &[], Some((3, 3)), "3 fields");
+    points_refused("X,Y\n1,2\n3,four\n", &[], Some((3, 3)), "not a number");
+    points_refused("X,Y\n1,nan\n3,4\n", &[], Some((2, 3)), "not a finite number");
+    points_refused("X,Y\n1,2\n3,1e400\n", &[], Some((3, 3)), "not a finite number");
+    points_refused("X,Y\n1,2\n3,301\n", &[], Some((3, 3)), "outside its travel");
+    points_refused("X,Y\n1,2\n", &[], None, "at least 2");
+    points_refused("X,Y\n1,2\n3,4\n3,4\n5,6\n", &[], Some((4, 1)), "repeats");
+    points_refused("X,Y\n0,0\n0.000001,0\n0.000002,0\n", &[], None, "whole drive count");
+    let open: String = (0..5).map(row).collect();
+    points_refused(format!("X,Y\n{open}"), &["--spline", "periodic"], Some((6, 1)), "not closed");
+    points_refused("X,Y\n1,2\n3,4\n", &["--spline", "periodic"], None, "at least");
+    let wild = "X,Y\n0,0\n399,1\n399.001,2\n0,3\n-399,299\n1,0\n";
+    points_refused(wild, &["--knots", "uniform"], Some((3, 1)), "outside its travel");
+}
+
+#[test]
+fn options_that_do_not_fit_the_job() {
+    let home = tempfile::tempdir().unwrap();
+    fs::write(home.path().join("points.csv"), "X,Y\n0,0\n1,2\n3,4\n5,5\n").unwrap();
+    fs::write(home.path().join("part.ngc"), "G21 G1 X5 F100\n").unwrap();
+    for verb in ["plan", "run", "compare"] {
+        for (file, words) in [
+            ("points.csv", &["--tolerance", "0.1"][..]),
+            ("points.csv", &["--dialect", "printer"]),
+            ("points.csv", &["--ignore-feed"]),
+            ("part.ngc", &["--spline", "natural"]),
+            ("part.ngc", &["--knots", "uniform"]),
+            ("part.ngc", &["--feed", "100"]),
+        ] {
+            let words = [&[verb, file, "-o", "out"], words].concat();
+            refused(home.path(), &words, Blamed { file, place: None, message: words[4] });
+        }
+    }
+    // A corner that the path turns back from cannot be travelled at one speed.
+    fs::write(home.path().join("back.csv"), "X\n0\n5\n10\n5\n0\n").unwrap();
+    let words = ["compare", "back.csv", "--methods", "constant-feed", "-o", "out"];
+    refused(home.path(), &words, Blamed { file: "back.csv", place: None, message: "turns back on itself" });
+    // Rapids alone are nothing to compare.
+    fs::write(home.path().join("rapid.ngc"), "G21 G0 X5\n").unwrap();
+    let words = ["compare", "rapid.ngc", "-o", "out"];
+    refused(home.path(), &words, Blamed { file: "rapid.ngc", place: None, message: "no feed move" });
+}
+
 /// A folder with the table of a small job, and its bytes.
 fn table() -> (TempDir, Vec<u8>) {
     let home = tempfile::tempdir().unwrap();

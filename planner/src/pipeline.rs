@@ -33,6 +33,8 @@ pub struct JobPlan {
     pub binding: Vec<Vec<Binding>>,
     /// Iterations of the solver, all sections together.
     pub iterations: u64,
+    /// What the solver left of the time, all sections together [s]; see [`crate::topp::problem::Plan::gap_s`].
+    pub gap_s: f64,
 }
 
 impl JobPlan {
@@ -124,7 +126,7 @@ where
             batch.into_par_iter().map(|item| plan_item(item, machine, limits, settings)).collect();
         for item in planned {
             match item? {
-                Planned::Section { section, certificate, binding, iterations } => {
+                Planned::Section { section, certificate, binding, iterations, gap_s } => {
                     if let Some(block) = section.marks.blocks.last() {
                         progress(block.line);
                     }
@@ -132,6 +134,7 @@ where
                     job.certificates.push(certificate);
                     job.binding.push(binding);
                     job.iterations += iterations;
+                    job.gap_s += gap_s;
                 }
                 Planned::Item(item) => job.items.push(item),
                 Planned::Nothing => {}
@@ -147,7 +150,13 @@ where
 /// One item, planned.
 #[allow(clippy::large_enum_variant, reason = "moved once, straight into the job")]
 enum Planned {
-    Section { section: PlannedSection, certificate: Certificate, binding: Vec<Binding>, iterations: u64 },
+    Section {
+        section: PlannedSection,
+        certificate: Certificate,
+        binding: Vec<Binding>,
+        iterations: u64,
+        gap_s: f64,
+    },
     Item(JobItem),
     Nothing,
 }
@@ -167,22 +176,30 @@ fn plan_item<E>(
     }
 }
 
+/// The program line that a fault of a section is about.
+pub fn line_of(fault: &PlanError, section: &Section) -> u32 {
+    section.marks.line_at(fault.place().unwrap_or(0.0) / section.path.step)
+}
+
 fn plan_section<E>(
     section: Section,
     machine: &Machine,
     set: LimitSet,
     settings: &Settings,
 ) -> Result<Planned, JobError<E>> {
-    let Section { kind, path, marks } = section;
-    let limits: Vec<AxisLimits> = machine.axes.iter().map(|axis| set.of(axis, kind)).collect();
-    let problem =
-        Problem { path: &path, limits: &limits, caps: &marks.caps, control_tick_s: machine.control_tick_s };
-    let plan = topp::plan(&problem, settings).map_err(|fault| JobError::Plan {
-        line: marks.line_at(fault.place().unwrap_or(0.0) / path.step),
-        fault,
-    })?;
+    let limits: Vec<AxisLimits> = machine.axes.iter().map(|axis| set.of(axis, section.kind)).collect();
+    let problem = Problem {
+        path: &section.path,
+        limits: &limits,
+        caps: &section.marks.caps,
+        control_tick_s: machine.control_tick_s,
+    };
+    let plan = topp::plan(&problem, settings)
+        .map_err(|fault| JobError::Plan { line: line_of(&fault, &section), fault })?;
+    let Section { kind, marks, .. } = section;
     let certificate = certify(&plan.table, &limits, &marks.caps);
     let section = PlannedSection { kind, limits, table: plan.table, marks };
     let binding = rulings(&section);
-    Ok(Planned::Section { section, certificate, binding, iterations: plan.iterations })
+    let (iterations, gap_s) = (plan.iterations, plan.gap_s);
+    Ok(Planned::Section { section, certificate, binding, iterations, gap_s })
 }

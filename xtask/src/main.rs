@@ -1,7 +1,9 @@
 //! One front door for building, checking and measuring: `cargo xtask <word>`.
 
 mod names;
+mod peers;
 mod real;
+mod scale;
 mod shell;
 mod tests;
 
@@ -30,7 +32,13 @@ enum Word {
     /// Everything that has to pass: format, lints, names in the documentation, all tests
     Test,
     /// Run the benches; what they measure is in docs/benchmarks.md
-    Bench,
+    Bench {
+        /// Then run other planners on the same paths, and print one table with ratios
+        #[arg(long)]
+        peers: bool,
+    },
+    /// Plan paths of up to a million spans and print time and memory of each
+    Scale,
     /// Build the documentation, warnings are errors
     Doc,
     /// What a change has to pass before it goes in: test, doc and a release build
@@ -53,7 +61,8 @@ fn main() -> ExitCode {
         Word::Fmt => cargo(&root, &["fmt", "--all"]),
         Word::Lint => lint(&root),
         Word::Test => test(&root),
-        Word::Bench => cargo(&root, &["bench", "--workspace", "--locked", "--bench", "*"]),
+        Word::Bench { peers } => bench(&root, peers),
+        Word::Scale => scale::run(&root),
         Word::Doc => doc(&root),
         Word::Ci => run_all(&[
             ("test", &|| test(&root)),
@@ -80,6 +89,12 @@ fn root() -> PathBuf {
 
 fn lint(root: &Path) -> Step {
     cargo(root, &["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"])
+}
+
+/// The benches, and after them the peers if wanted.
+fn bench(root: &Path, peers: bool) -> Step {
+    cargo(root, &["bench", "--workspace", "--locked", "--bench", "*"])?;
+    if peers { peers::run(root) } else { Ok(()) }
 }
 
 fn doc(root: &Path) -> Step {

@@ -1,26 +1,19 @@
 //! From the command line to a planned job.
 
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::time::Instant;
 
-use planner::analysis::comparison::Comparison;
-use planner::geometry::sections::{PathSettings, SectionError, sections};
-use planner::job::gcode::{self, Counters, Options, ProgramError};
 use planner::job::machine::{LimitSet, Machine};
-use planner::job::program::{Corner, Item, MoveKind, StopCause, ToleranceSource};
 use planner::pipeline::{self, JobError, JobPlan};
 use planner::topp::PlanError;
-use planner::topp::problem::{Settings, Solver};
+use planner::topp::problem::{JerkForm, Settings, Solver, Windows};
 
-use crate::args::{self, PlanArgs};
+use super::job::{self, Told, placed};
+use crate::args::{self, Jerk, JobArgs, PlanArgs};
 use crate::failure::Failure;
 use crate::progress::Progress;
-
-/// The machine that jobs run on when none is named.
-const BUILT_IN: &str = include_str!("../../../jobs/mill3.toml");
 
 /// Bytes of a program that are read ahead to tell how long it is.
 const READ_AHEAD: usize = 1 << 16;
@@ -30,20 +23,10 @@ const READ_AHEAD: usize = 1 << 16;
 pub(super) struct Fitted {
     pub(super) machine: Machine,
     pub(super) plan: JobPlan,
-    pub(super) counters: Counters,
-    pub(super) comparison: Comparison,
-    pub(super) stops: BTreeMap<StopCause, u64>,
-    pub(super) tolerance: InForce,
-    /// Size of the largest figure that standing still is within the tolerance of [mm].
-    pub(super) left_out_mm: f64,
+    pub(super) told: Told,
+    /// How jerk is limited.
+    pub(super) jerk: Jerk,
     pub(super) seconds: f64,
-}
-
-/// The largest path tolerance in force, and who set it.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct InForce {
-    pub(super) mm: f64,
-    pub(super) source: Option<ToleranceSource>,
 }
 
 /// Reads, fits, plans and certifies a job.
@@ -52,121 +35,54 @@ pub(super) struct InForce {
 /// Bad input, with its place.
 pub(super) fn plan(args: &PlanArgs, progress: &mut Progress) -> Result<Fitted, Failure> {
     let begin = Instant::now();
-    if let Some(threads) = args.threads {
-        // Fails only when threads run already, which happens when one process plans twice.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
-    }
-    let machine = match &args.machine {
-        Some(path) => Machine::load(path)
-            .map_err(|e| placed(e.kind().to_string(), path, e.line(), e.column()).quoting(e))?,
-        None => Machine::from_toml(BUILT_IN, "built-in machine")
-            .map_err(|e| Failure::internal(format!("the built-in machine is not sound: {e}")))?,
-    };
-    let refused = |e: ProgramError| placed(e.kind().to_string(), &args.job, e.line(), e.column()).quoting(e);
-    let mut program = gcode::open(&args.job, &machine, options(args)).map_err(refused)?;
-
+    let jerk = args.jerk_form()?;
+    job::set_threads(&args.job);
+    let machine = job::machine(&args.job)?;
     progress.stage("planning");
-    let lines = if progress.watched() { line_count(&args.job) } else { 0 };
-    let mut comparison = Comparison::new(&machine.axes);
-    let mut tolerance = InForce::default();
-    let items = program.by_ref().inspect(|item| match item {
-        Ok(Item::Move(m)) => {
-            comparison.add(m);
-            if m.kind == MoveKind::Feed {
-                tolerance.note(m.corner, &machine);
-            }
-        }
-        Ok(Item::Dwell { seconds, .. }) => comparison.add_dwell(*seconds),
-        Ok(Item::Stop { .. } | Item::Note { .. }) | Err(_) => {}
-    });
-    let mut sections = sections(items, &machine, &PathSettings::of(&machine, limits(args)));
-    let planned = pipeline::plan(&mut sections, &machine, limits(args), &settings(args), &mut |line| {
-        progress.share(f64::from(line) / lines.max(1) as f64);
-    });
-    let stops = sections.stops().clone();
-    let left_out_mm = sections.left_out_mm();
-    drop(sections);
-    let plan = planned.map_err(|e| match e {
-        JobError::Section(SectionError::Program(e)) => refused(e),
-        JobError::Section(SectionError::Geometry(e)) => {
-            placed(e.to_string(), &args.job, Some(e.line()), None)
-                .with_help("Widen the tolerance (G64 P or --tolerance), or change the path at this line.")
-        }
-        JobError::Plan { line, fault } => {
-            placed(fault.to_string(), &args.job, Some(line), None).with_help(remedy(&fault))
-        }
+    let lines = if progress.watched() { line_count(&args.job.file) } else { 0 };
+    let limits = limits(jerk);
+    let (plan, told) = job::read(&args.job, &machine, limits, |sections| {
+        pipeline::plan(sections, &machine, limits, &settings(args, jerk), &mut |line| {
+            progress.share(f64::from(line) / lines.max(1) as f64);
+        })
+        .map_err(|e| match e {
+            JobError::Section(failure) => failure,
+            JobError::Plan { line, fault } => unplannable(&args.job, line, &fault),
+        })
     })?;
-    let counters = program.counters().clone();
-    Ok(Fitted {
-        machine,
-        plan,
-        counters,
-        comparison,
-        stops,
-        tolerance,
-        left_out_mm,
-        seconds: begin.elapsed().as_secs_f64(),
-    })
+    Ok(Fitted { machine, plan, told, jerk, seconds: begin.elapsed().as_secs_f64() })
 }
 
-impl InForce {
-    /// Takes in the corner of one feed move.
-    fn note(&mut self, corner: Corner, machine: &Machine) {
-        let (mm, source) = match corner {
-            Corner::Within { tolerance_mm, source } if tolerance_mm > 0.0 => (tolerance_mm, source),
-            Corner::Within { source, .. } => (machine.exact_path_mm, source),
-            Corner::Stop | Corner::Exact => (machine.exact_path_mm, ToleranceSource::Program),
-        };
-        if self.source.is_none() || mm > self.mm {
-            *self = InForce { mm, source: Some(source) };
-        }
-    }
-
-    /// In words.
-    pub(super) fn words(self) -> &'static str {
-        match self.source {
-            Some(ToleranceSource::Program) => "program",
-            Some(ToleranceSource::CommandLine) => "command line",
-            Some(ToleranceSource::BestSpeed) => "machine, for G64 without P",
-            Some(ToleranceSource::Machine) | None => "machine",
-        }
+/// The axis limits that count.
+pub(super) fn limits(jerk: Jerk) -> LimitSet {
+    match jerk {
+        Jerk::None => LimitSet::VelocityAcceleration,
+        Jerk::True | Jerk::Pseudo => LimitSet::VelocityAccelerationJerk,
     }
 }
 
-fn options(args: &PlanArgs) -> Options {
-    Options {
-        dialect: match args.dialect {
-            args::Dialect::Rs274 => gcode::Dialect::Rs274,
-            args::Dialect::Printer => gcode::Dialect::Printer,
+fn settings(args: &PlanArgs, jerk: Jerk) -> Settings {
+    Settings {
+        solver: match args.solver {
+            args::Solver::InteriorPoint => Solver::InteriorPoint,
+            args::Solver::Clarabel => Solver::Clarabel,
         },
-        tolerance_mm: args.tolerance,
-        ignore_feed: args.ignore_feed,
-        block_delete: false,
+        jerk: match jerk {
+            Jerk::True | Jerk::None => JerkForm::True,
+            Jerk::Pseudo => JerkForm::Pseudo,
+        },
+        windows: match args.windows {
+            args::Windows::Overlap => Windows::Overlap,
+            args::Windows::Whole => Windows::Whole,
+            args::Windows::Zhao => Windows::Zhao,
+        },
+        ..Settings::default()
     }
 }
 
-fn limits(args: &PlanArgs) -> LimitSet {
-    match args.limits {
-        args::Limits::Va => LimitSet::VelocityAcceleration,
-        args::Limits::Vaj => LimitSet::VelocityAccelerationJerk,
-    }
-}
-
-fn settings(args: &PlanArgs) -> Settings {
-    let solver = match args.solver {
-        args::Solver::InteriorPoint => Solver::InteriorPoint,
-        args::Solver::Clarabel => Solver::Clarabel,
-    };
-    Settings { solver, ..Settings::default() }
-}
-
-/// Bad input in a file, at a place if that is known.
-fn placed(message: String, file: &Path, line: Option<u32>, column: Option<u32>) -> Failure {
-    let failure = Failure::input(message);
-    match (line, column) {
-        (Some(line), column) => failure.at(file, line, column.unwrap_or(1)),
-        (None, _) => failure.in_file(file),
-    }
+/// A section that cannot be planned.
+pub(super) fn unplannable(args: &JobArgs, line: u32, fault: &PlanError) -> Failure {
+    placed(fault.to_string(), &args.file, Some(line), None).with_help(remedy(fault))
 }
 
 /// What to do about a section that cannot be planned.

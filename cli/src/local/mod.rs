@@ -1,16 +1,20 @@
 //! The planner and the simulator of this workspace, behind the verbs.
 
+mod compare;
 mod files;
 mod fitting;
+mod job;
 mod outcome;
 mod playback;
+mod points;
+mod program;
 mod walk;
 
 use std::io::Write;
 use std::path::Path;
 
-use crate::args::{PlanArgs, RunArgs};
-use crate::engine::{Engine, Outcome};
+use crate::args::{CompareArgs, PlanArgs, RunArgs};
+use crate::engine::{Compared, Engine, Outcome};
 use crate::failure::Failure;
 use crate::json::{InspectJson, VerifyJson};
 use crate::progress::Progress;
@@ -35,6 +39,10 @@ impl Engine for Local {
         let fitted = fitting::plan(&args.plan, progress)?;
         let played = playback::simulated(&fitted, args.trace_every, trace, progress)?;
         outcome::assemble(&args.plan, &fitted, played.motion, Some(&played.drives))
+    }
+
+    fn compare(&self, args: &CompareArgs, progress: &mut Progress) -> Result<Compared, Failure> {
+        compare::compare(args, progress)
     }
 
     fn verify(&self, file: &Path, progress: &mut Progress) -> Result<VerifyJson, Failure> {

@@ -13,8 +13,9 @@ use planner::job::program::{MoveKind, StopCause};
 use planner::topp::problem::Binding;
 
 use super::fitting::Fitted;
+use super::job::{Points, Told};
 use super::playback::{Drives, seconds};
-use crate::args::{Limits, PlanArgs, Solver};
+use crate::args::{self, Jerk, PlanArgs};
 use crate::engine::Outcome;
 use crate::failure::Failure;
 use crate::json::{
@@ -124,7 +125,8 @@ fn plan_json(
     findings: &Findings,
     drives: Option<&Drives>,
 ) -> PlanJson {
-    let Fitted { machine, plan, counters, comparison, stops, tolerance, .. } = fitted;
+    let Fitted { machine, plan, told, .. } = fitted;
+    let Told { counters, comparison, stops, tolerance, .. } = told;
     let motion_time_s = plan.sections().fold(0.0, |sum, s| sum + s.table.duration());
     let (tolerance_mm, raised) = tolerance_in_force(fitted);
     let linear: Vec<usize> =
@@ -134,14 +136,16 @@ fn plan_json(
         linear.iter().map(|&i| whole.map_or(0.0, |b| pick(b)[i])).collect()
     };
     PlanJson {
-        job: args.job.display().to_string(),
+        job: args.job.file.display().to_string(),
+        job_kind: told.kind(),
+        way_points: told.points.as_ref().map(Points::json),
         machine: machine.name.clone(),
         axes: machine.axes.iter().map(|a| AxisJson { name: a.name.clone(), unit: unit(a).into() }).collect(),
         blocks: counters.blocks,
         rapids: counters.rapids,
         lines: counters.lines,
         arcs: counters.arcs,
-        splines: 0,
+        splines: u64::from(told.points.is_some()),
         dwells: counters.dwells,
         stops: stops.values().sum(),
         stops_by_cause: stops.iter().map(|(&cause, &count)| (stop_name(cause), count)).collect(),
@@ -168,13 +172,21 @@ fn plan_json(
         table_bytes: size.total(),
         plan_seconds: fitted.seconds,
         peak_memory_mib: peak_memory_mib(),
-        solver: solver(args.solver).into(),
+        solver: args::name(args.solver),
+        jerk_form: args::name(fitted.jerk),
+        windows: args::name(args.windows),
         iterations: plan.iterations,
-        certificate: verdict(args, fitted),
+        gap_estimate: share(plan.gap_s, motion_time_s),
+        certificate: verdict(fitted),
         simulation: drives.map(simulation_json),
         notes: notes(fitted),
         files: FilesJson::default(),
     }
+}
+
+/// A gap as a share of the time; `None` where it is not known or there is no motion.
+pub(super) fn share(gap_s: f64, time_s: f64) -> Option<f64> {
+    Some(gap_s / time_s).filter(|share| share.is_finite())
 }
 
 /// Kind of a limit, and its axis by name.
@@ -183,7 +195,7 @@ fn named(limit: Binding, machine: &Machine) -> (&'static str, Option<String>) {
     (kind, axis.and_then(|i| machine.axes.get(usize::from(i))).map(|a| a.name.clone()))
 }
 
-fn binding_json(share: &binding::Share, machine: &Machine) -> BindingJson {
+pub(super) fn binding_json(share: &binding::Share, machine: &Machine) -> BindingJson {
     let (kind, axis) = named(share.limit, machine);
     BindingJson { kind, axis, seconds: share.seconds, share: share.share }
 }
@@ -228,16 +240,16 @@ fn bus_json(drives: &Drives) -> BusJson {
 fn worst_deviation(fitted: &Fitted) -> (f64, u32) {
     let feed = fitted.plan.sections().filter(|s| s.kind == MoveKind::Feed);
     feed.map(|s| (s.marks.deviation.bound_mm, s.marks.deviation.line))
-        .fold((fitted.left_out_mm, 0), |worst, d| if d.0 > worst.0 { d } else { worst })
+        .fold((fitted.told.left_out_mm, 0), |worst, d| if d.0 > worst.0 { d } else { worst })
 }
 
 /// The worst of all sections' certificates.
 ///
 /// It holds when a reader of the `.feed` file, who has nothing else, would find no fault either.
-fn verdict(args: &PlanArgs, fitted: &Fitted) -> CertificateJson {
+fn verdict(fitted: &Fitted) -> CertificateJson {
     let all = &fitted.plan.certificates;
     let mut axes = FileHeader::from(&fitted.machine).axes;
-    if args.limits == Limits::Va {
+    if fitted.jerk == Jerk::None {
         for axis in &mut axes {
             (axis.limits.jerk, axis.rapid.jerk) = (f64::INFINITY, f64::INFINITY);
         }
@@ -249,7 +261,7 @@ fn verdict(args: &PlanArgs, fitted: &Fitted) -> CertificateJson {
         holds: all.iter().all(|c| c.holds) && verify(&fitted.plan.items, &axes).holds,
         velocity_ratio: worst(|c| c.velocity_ratio),
         acceleration_ratio: worst(|c| c.acceleration_ratio),
-        jerk_ratio: (args.limits == Limits::Vaj).then(|| worst(|c| c.jerk_ratio)),
+        jerk_ratio: (fitted.jerk != Jerk::None).then(|| worst(|c| c.jerk_ratio)),
         feed_ratio: (feed_ratio > 0.0).then_some(feed_ratio),
     }
 }
@@ -258,7 +270,7 @@ fn verdict(args: &PlanArgs, fitted: &Fitted) -> CertificateJson {
 fn tolerance_in_force(fitted: &Fitted) -> (f64, bool) {
     let feed = fitted.plan.sections().filter(|s| s.kind == MoveKind::Feed);
     let used = feed.map(|s| s.marks.deviation.tolerance_mm).fold(0.0, f64::max);
-    let asked = fitted.tolerance.mm;
+    let asked = fitted.told.tolerance.mm;
     if used > asked * (1.0 + 1e-9) { (used, true) } else { (asked, false) }
 }
 
@@ -268,10 +280,10 @@ fn notes(fitted: &Fitted) -> Vec<NoteJson> {
         JobItem::Section(_) | JobItem::Dwell { .. } => None,
     };
     let mut notes: Vec<NoteJson> = fitted.plan.items.iter().filter_map(note).collect();
-    if fitted.left_out_mm > 0.0 {
+    if fitted.told.left_out_mm > 0.0 {
         let text = format!(
             "moves of up to {:.4} mm are left out: the tolerance allows to stand still",
-            fitted.left_out_mm
+            fitted.told.left_out_mm
         );
         notes.push(NoteJson { line: 1, text });
     }
@@ -288,8 +300,8 @@ fn report(
     motion: Motion,
     drives: Option<&Drives>,
 ) -> Report {
-    let name = args.job.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let jerk = args.limits == Limits::Vaj;
+    let name = args.job.file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let jerk = fitted.jerk != Jerk::None;
     let ratios = fitted.plan.certificates.iter().fold(
         vec![AxisRatios::default(); fitted.machine.axes.len()],
         |mut all, c| {
@@ -300,6 +312,7 @@ fn report(
         },
     );
     let mut stops: Vec<model::Stops> = fitted
+        .told
         .stops
         .iter()
         .map(|(&cause, &count)| model::Stops { cause: stop_words(cause).into(), count })
@@ -307,6 +320,7 @@ fn report(
     stops.sort_by_key(|s| std::cmp::Reverse(s.count));
     Report {
         job: name,
+        way_points: json.way_points.clone(),
         machine: json.machine.clone(),
         times: model::Times {
             cycle_s: json.cycle_time_s,
@@ -437,13 +451,6 @@ pub(super) fn unit(axis: &Axis) -> &'static str {
         Unit::Mm => "mm",
         Unit::Deg => "deg",
         Unit::Rad => "rad",
-    }
-}
-
-fn solver(solver: Solver) -> &'static str {
-    match solver {
-        Solver::InteriorPoint => "interior-point",
-        Solver::Clarabel => "clarabel",
     }
 }
 

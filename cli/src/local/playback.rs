@@ -6,7 +6,7 @@ use host_sim::report::SimReport;
 use host_sim::scenario::{SimSettings, simulate};
 use host_sim::trace::{CsvTrace, Rows, TraceHeader, TraceRow, TraceSink};
 use planner::feed::job::{JobItem, PlannedSection};
-use planner::job::machine::AxisKind;
+use planner::job::machine::{AxisKind, Machine};
 use planner::topp::problem::Binding;
 
 use super::fitting::Fitted;
@@ -37,17 +37,27 @@ pub(super) struct Drives {
 
 /// The motion as planned.
 pub(super) fn planned(fitted: &Fitted) -> Motion {
-    let cycle: f64 = fitted.plan.items.iter().map(seconds).sum();
-    let interval = fitted.machine.control_tick_s.max(cycle / INSTANTS);
-    let mut recorder = Recorder::new(&report_axes(&fitted.machine));
-    let mut binding = fitted.plan.binding.iter();
+    let recorder = Recorder::new(&report_axes(&fitted.machine));
+    record(&fitted.plan.items, &fitted.plan.binding, &fitted.machine, recorder)
+}
+
+/// The motion of planned items, and what rules each span of their sections.
+pub(super) fn record(
+    items: &[JobItem],
+    binding: &[Vec<Binding>],
+    machine: &Machine,
+    mut recorder: Recorder,
+) -> Motion {
+    let cycle: f64 = items.iter().map(seconds).sum();
+    let interval = machine.control_tick_s.max(cycle / INSTANTS);
+    let mut binding = binding.iter();
     let (mut clock, mut standing) = (0.0, Vec::new());
-    for item in &fitted.plan.items {
+    for item in items {
         let duration = seconds(item);
         match item {
             JobItem::Section(section) => {
                 let binding = binding.next().map_or(&[][..], Vec::as_slice);
-                let mut walk = Walk::new(section, binding, linear(fitted));
+                let mut walk = Walk::new(section, binding, linear(machine));
                 let count = (duration / interval).ceil().max(1.0) as u64;
                 for k in 0..=count {
                     let time = (k as f64 * interval).min(duration);
@@ -101,8 +111,8 @@ pub(super) fn seconds(item: &JobItem) -> f64 {
 }
 
 /// Mask of the linear axes.
-fn linear(fitted: &Fitted) -> u16 {
-    let axes = fitted.machine.axes.iter().enumerate();
+pub(super) fn linear(machine: &Machine) -> u16 {
+    let axes = machine.axes.iter().enumerate();
     axes.filter(|(_, a)| a.kind == AxisKind::Linear).fold(0, |mask, (i, _)| mask | 1 << i)
 }
 
@@ -122,7 +132,7 @@ impl<'a> Watch<'a> {
         let binding = fitted.plan.binding.iter().map(Vec::as_slice);
         Watch {
             sections: fitted.plan.sections().zip(binding).collect(),
-            linear: linear(fitted),
+            linear: linear(&fitted.machine),
             walk: None,
             recorder: Recorder::new(&report_axes(&fitted.machine)),
             drives: Vec::new(),

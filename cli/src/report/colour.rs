@@ -20,6 +20,13 @@ pub fn of_axis(axis: usize) -> String {
     css(HUES[axis % HUES.len()])
 }
 
+/// The colour of a method in a comparison as a CSS colour; there is one more than hues, and grey.
+pub fn of_method(method: usize) -> String {
+    const MORE: [Rgb; 2] = [[0x6f, 0x4e, 0xa1], [0x7d, 0x86, 0x92]];
+    let all = HUES.len() + MORE.len();
+    css(HUES.iter().chain(&MORE).copied().nth(method % all).unwrap_or(MORE[1]))
+}
+
 /// The colour of a limit as a CSS colour.
 pub fn of_limit(limit: Limit) -> String {
     let hue = |axis: u8| HUES[usize::from(axis) % HUES.len()];

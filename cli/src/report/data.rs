@@ -76,14 +76,14 @@ struct PathData {
 }
 
 #[derive(Serialize)]
-struct Series {
+pub(super) struct Series {
     o: f64,
     s: f64,
     d: Vec<Option<i64>>,
 }
 
 #[derive(Serialize)]
-struct Band {
+pub(super) struct Band {
     o: f64,
     s: f64,
     d: Vec<Option<i64>>,
@@ -185,11 +185,11 @@ impl Data {
             unit: speed_unit(report),
         }
     }
+}
 
-    /// As text that can stand in a script element: no `<` can end it.
-    pub(super) fn text(&self) -> String {
-        serde_json::to_string(self).unwrap_or_default().replace('<', "\\u003c")
-    }
+/// Numbers as text that can stand in a script element: no `<` can end it.
+pub(super) fn text(data: &impl Serialize) -> String {
+    serde_json::to_string(data).unwrap_or_default().replace('<', "\\u003c")
 }
 
 /// Slow places marked in the picture; the table numbers the same ones.
@@ -210,7 +210,7 @@ fn spread(values: impl Iterator<Item = f64>) -> f64 {
     if high > low { high - low } else { 0.0 }
 }
 
-fn fine(values: &[f64]) -> Series {
+pub(super) fn fine(values: &[f64]) -> Series {
     series(values, spread(values.iter().copied()) / (2.5 * FINE))
 }
 
@@ -239,7 +239,7 @@ fn series(values: &[f64], resolution: f64) -> Series {
     Series { o, s, d: values.iter().map(|&v| v.is_finite().then(|| ((v - o) / s).round() as i64)).collect() }
 }
 
-fn band(envelope: &Envelope) -> Band {
+pub(super) fn band(envelope: &Envelope) -> Band {
     let all = envelope.lo.iter().chain(&envelope.hi).copied();
     let base = series(&envelope.lo, spread(all) / FINE);
     let e: Vec<i64> =

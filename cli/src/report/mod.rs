@@ -1,9 +1,10 @@
 //! The report: one HTML file that needs nothing else.
 //!
 //! [`record::Recorder`] thins the motion out, [`model::Report`] holds all that is shown, [`page`] writes it.
-//! The plots are drawn by `report.js` from numbers embedded in the page; everything else is plain HTML.
+//! [`compare`] does the same for methods side by side. The plots are drawn by scripts from numbers embedded in the page; everything else is plain HTML.
 
 pub mod colour;
+pub mod compare;
 mod data;
 mod envelope;
 mod html;

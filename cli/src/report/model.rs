@@ -4,13 +4,15 @@ use planner::analysis::operations::Operation;
 use planner::analysis::shortfall::Shortfall;
 use planner::topp::problem::Binding;
 
-use crate::json::{BusJson, CertificateJson, NoteJson};
+use crate::json::{BusJson, CertificateJson, NoteJson, WayPointsJson};
 
 /// A report.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// File name of the part program.
+    /// File name of the job.
     pub job: String,
+    /// The way-points and the spline through them; `None` for a part program.
+    pub way_points: Option<WayPointsJson>,
     /// Name of the machine.
     pub machine: String,
     /// The headline times.

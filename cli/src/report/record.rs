@@ -96,6 +96,11 @@ pub struct Recorder {
 impl Recorder {
     /// A recorder for a machine.
     pub fn new(axes: &[Axis]) -> Self {
+        Self::within(TRACE_NUMBERS, axes)
+    }
+
+    /// A recorder whose traces hold about so many numbers.
+    pub fn within(numbers: usize, axes: &[Axis]) -> Self {
         let mut shown: Vec<usize> = (0..axes.len()).filter(|&i| axes[i].linear).collect();
         shown.extend((0..axes.len()).filter(|&i| !axes[i].linear));
         shown.truncate(3);
@@ -103,7 +108,7 @@ impl Recorder {
             shown,
             traces: Traces { axes: vec![AxisTraces::default(); axes.len()], ..Traces::default() },
             // Five envelopes per axis and six series for the path; the count swings between half and full.
-            most_intervals: (TRACE_NUMBERS / (10 * axes.len() + 6)).max(64) & !1,
+            most_intervals: (numbers / (10 * axes.len() + 6)).max(64) & !1,
             axes: axes.to_vec(),
             stride: (1, 0),
             points: Vec::new(),

@@ -1,48 +1,11 @@
-"use strict";
 (() => {
-  const D = JSON.parse(document.getElementById("data").textContent);
-  const root = document.documentElement;
-  const css = name => getComputedStyle(root).getPropertyValue(name).trim();
-
-  // Series come as integers with an origin and a step; an envelope adds highest minus lowest.
-  const unpack = s => Float64Array.from(s.d, v => v === null ? NaN : s.o + s.s * v);
-  const unpackBand = s => {
-    const lo = unpack(s);
-    return { lo, hi: s.e ? lo.map((v, i) => v + s.s * s.e[i]) : lo };
-  };
   const T = D.t, P = D.path;
   for (const key of ["time", "pos", "line", "ceiling"]) T[key] = unpack(T[key]);
   T.speed = unpackBand(T.speed);
   for (const axis of T.axes) for (const key of "vajef") axis[key] = unpackBand(axis[key]);
   for (const key of ["time", "speed", "line"]) P[key] = unpack(P[key]);
   P.at = P.at.map(unpack);
-  const span = values => {
-    let lo = Infinity, hi = -Infinity;
-    for (const v of values) { if (v < lo) lo = v; if (v > hi) hi = v; }
-    return lo <= hi ? [lo, hi] : [0, 0];
-  };
   const topSpeed = span(P.speed.filter((v, i) => P.mode[i] === 1))[1] || span(P.speed)[1] || 1;
-
-  // Numbers and ticks.
-  const niceStep = raw => {
-    const p = 10 ** Math.floor(Math.log10(raw)), m = raw / p;
-    return (m <= 1 ? 1 : m <= 2 ? 2 : m <= 5 ? 5 : 10) * p;
-  };
-  const group = text => text.replace(/\B(?=(\d{3})+(?!\d))/g, "\u202f").replace("-", "\u2212");
-  const fixed = (v, decimals) => {
-    const [whole, part] = v.toFixed(Math.min(Math.max(decimals, 0), 8)).split(".");
-    return group(+v.toFixed(8) === 0 ? "0" : whole) + (part ? "." + part : "");
-  };
-  const digits = step => Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-  const show = v => {
-    if (!v) return v === 0 ? "0" : "\u2013";
-    return fixed(v, 3 - Math.floor(Math.log10(Math.abs(v))));
-  };
-  const ticks = (lo, hi, n) => {
-    const step = niceStep((hi - lo) / Math.max(n, 1)), out = [];
-    for (let k = Math.ceil(lo / step - 1e-9); k * step <= hi + step * 1e-9; k++) out.push(k * step);
-    return { at: out, text: v => fixed(v, digits(step)) };
-  };
 
   // A map from dark blue over green to yellow with even lightness steps (viridis, nine stops).
   const STOPS = ["#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30", "#fde725"]
@@ -51,37 +14,6 @@
     const from = +css("--map-from"), to = +css("--map-to");
     const p = (from + (to - from) * Math.min(Math.max(x, 0), 1)) * 8, i = Math.min(Math.floor(p), 7);
     return `rgb(${STOPS[i].map((c, k) => Math.round(c + (STOPS[i + 1][k] - c) * (p - i))).join()})`;
-  };
-
-  const sized = canvas => {
-    const scale = window.devicePixelRatio || 1, box = canvas.getBoundingClientRect();
-    canvas.width = Math.max(1, Math.round(box.width * scale));
-    canvas.height = Math.max(1, Math.round(box.height * scale));
-    const g = canvas.getContext("2d");
-    g.setTransform(scale, 0, 0, scale, 0, 0);
-    g.font = "11px system-ui, 'DejaVu Sans', sans-serif";
-    return { g, w: box.width, h: box.height };
-  };
-  const overlay = (figure, name) => figure.appendChild(Object.assign(document.createElement("div"), { className: name }));
-  const place = (e, x, y, w, h) => Object.assign(e.style, {
-    display: "block", left: x + "px", top: y + "px",
-    ...(w === undefined ? {} : { width: w + "px" }), ...(h === undefined ? {} : { height: h + "px" }),
-  });
-  const hide = e => { e.style.display = "none"; };
-  // Last index whose value is not above v, in a rising series.
-  const seek = (series, v) => {
-    let lo = 0, hi = series.length - 1;
-    while (lo < hi) { const mid = (lo + hi + 1) >> 1; if (series[mid] <= v) lo = mid; else hi = mid - 1; }
-    return lo;
-  };
-  // Drag along or across a canvas; a click without a drag does nothing.
-  const dragging = (canvas, move, done) => {
-    let from = null;
-    const at = e => { const b = canvas.getBoundingClientRect(); return [e.clientX - b.left, e.clientY - b.top]; };
-    canvas.addEventListener("pointerdown", e => { from = at(e); canvas.setPointerCapture(e.pointerId); });
-    canvas.addEventListener("pointermove", e => { if (from) move(from, at(e)); });
-    canvas.addEventListener("pointerup", e => { if (from) done(from, at(e)); from = null; });
-    canvas.addEventListener("pointercancel", () => { if (from) done(from, from); from = null; });
   };
 
   // Everything over time shares one window, everything shares one cursor.

@@ -63,7 +63,7 @@ pub(super) fn headline(report: &Report) -> Markup {
             }
             @if let Some(stop) = t.stop_every_block_s.filter(|_| t.motion_s > 0.0) {
                 (card(
-                    "Stopping at every block",
+                    if report.way_points.is_some() { "Stopping at every way-point" } else { "Stopping at every block" },
                     &duration(stop),
                     &format!("{} as long as this plan", times(stop / t.motion_s)),
                     "",
@@ -76,7 +76,7 @@ pub(super) fn headline(report: &Report) -> Markup {
                 if verdict.holds { "good" } else { "bad" },
             ))
             (card(
-                "Deviation from the program",
+                if report.way_points.is_some() { "Deviation from the way-points" } else { "Deviation from the program" },
                 &format!("\u{2264} {} mm", number(tolerance.deviation_mm)),
                 &format!("{} mm allowed by the {}", number(tolerance.tolerance_mm), tolerance.source),
                 if tolerance.deviation_mm <= tolerance.tolerance_mm { "good" } else { "bad" },

@@ -23,7 +23,8 @@ pub(super) fn slow(report: &Report) -> Markup {
         section {
             h2 { "Where the programmed feed is not reached" }
             @if slow.places.is_empty() {
-                p { "It is reached everywhere." }
+                @if report.certificate.verdict.feed_ratio.is_none() { p { "No feed is programmed." } }
+                @else { p { "It is reached everywhere." } }
             } @else {
                 p {
                     b { (duration(slow.lost_s)) } " are lost against the programmed feed, in "
@@ -138,7 +139,8 @@ pub(super) fn proof(report: &Report) -> Markup {
             } }
             p {
                 "The path is nowhere further than " b { (number(tolerance.deviation_mm)) " mm" }
-                " from the programmed contour (line " (tolerance.line) "); "
+                @if report.way_points.is_some() { " from the way-points" } @else { " from the programmed contour" }
+                " (line " (tolerance.line) "); "
                 (number(tolerance.tolerance_mm)) " mm are allowed, set by the " (tolerance.source) "."
             }
             @if let Some(sim) = &report.simulation {
@@ -199,11 +201,18 @@ pub(super) fn facts(report: &Report) -> Markup {
     html! {
         section.columns {
             div {
-                h2 { "Program" }
+                h2 { @if report.way_points.is_some() { "Way-points" } @else { "Program" } }
                 table.facts { tbody {
-                    (fact("Blocks", &count(c.blocks)))
-                    (fact("Lines", &count(c.lines)))
-                    (fact("Arcs", &count(c.arcs)))
+                    @if let Some(points) = &report.way_points {
+                        (fact("Way-points", &count(points.count)))
+                        (fact("Ends of the spline", &points.ends))
+                        (fact("Knots of the spline", &points.knots))
+                    }
+                    @if report.way_points.is_none() {
+                        (fact("Blocks", &count(c.blocks)))
+                        (fact("Lines", &count(c.lines)))
+                        (fact("Arcs", &count(c.arcs)))
+                    }
                     @if c.splines > 0 { (fact("Splines", &count(c.splines))) }
                     (fact("Rapids", &count(c.rapids)))
                     (fact("Dwells", &count(c.dwells)))

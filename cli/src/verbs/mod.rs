@@ -1,8 +1,10 @@
 //! One file per verb.
 
+pub mod compare;
 pub mod inspect;
 pub mod plan;
 pub mod run;
+pub mod sample;
 pub mod verify;
 
 /// How a verb ended.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::Verdict;
-use crate::args::PlanArgs;
+use crate::args::{JobArgs, PlanArgs};
 use crate::console::Console;
 use crate::engine::{Engine, Outcome};
 use crate::failure::Failure;
@@ -20,7 +20,7 @@ pub fn execute(args: &PlanArgs, engine: &dyn Engine, console: &mut Console<'_>) 
     let mut progress = Progress::new(console.talk());
     let outcome = engine.plan(args, &mut progress)?;
     drop(progress);
-    let set = OutputSet::open(&folder(args)?)?;
+    let set = OutputSet::open(&folder(&args.job)?)?;
     deliver(outcome, args, set, None, console)
 }
 
@@ -28,10 +28,10 @@ pub fn execute(args: &PlanArgs, engine: &dyn Engine, console: &mut Console<'_>) 
 ///
 /// # Errors
 /// The job's name names nothing.
-pub fn folder(args: &PlanArgs) -> Result<PathBuf, Failure> {
+pub fn folder(args: &JobArgs) -> Result<PathBuf, Failure> {
     match &args.out {
         Some(folder) => Ok(folder.clone()),
-        None => Ok(Path::new("out").join(stem(&args.job)?)),
+        None => Ok(Path::new("out").join(stem(&args.file)?)),
     }
 }
 
@@ -42,9 +42,9 @@ pub fn folder(args: &PlanArgs) -> Result<PathBuf, Failure> {
 fn stem(job: &Path) -> Result<String, Failure> {
     match job.file_stem() {
         Some(stem) => Ok(stem.to_string_lossy().into_owned()),
-        None => Err(Failure::input("this is not a file")
-            .in_file(job)
-            .with_help("Name a part program, such as jobs/cat.ngc.")),
+        None => Err(Failure::input("this is not a file").in_file(job).with_help(
+            "Name a part program, such as jobs/cat.ngc, or a file of way-points, such as jobs/cat2d.csv.",
+        )),
     }
 }
 
@@ -64,7 +64,7 @@ pub fn deliver(
     let verdict = Verdict::of(outcome.json.certificate.holds);
     let show = |path: &Path| Some(path.display().to_string());
     let files = &mut outcome.json.files;
-    let feed = format!("{}.feed", stem(&args.job)?);
+    let feed = format!("{}.feed", stem(&args.job.file)?);
     match verdict {
         Verdict::Holds => files.feed = show(&set.write(&feed, &outcome.feed)?),
         // The table of an earlier run is not what the new report is about.
@@ -72,7 +72,7 @@ pub fn deliver(
     }
     files.report = show(&set.write("report.html", report::page(&outcome.report).as_bytes())?);
     files.trace = trace.as_deref().and_then(show);
-    files.plan = show(&folder(args)?.join("plan.json"));
+    files.plan = show(&folder(&args.job)?.join("plan.json"));
     let plan = serde_json::to_vec_pretty(&outcome.json)
         .map_err(|e| Failure::internal(format!("plan.json cannot be made: {e}")))?;
     set.write("plan.json", &plan)?;

@@ -15,7 +15,7 @@ use crate::progress::Progress;
 /// # Errors
 /// As `plan`, or the simulated drives refuse the table.
 pub fn execute(args: &RunArgs, engine: &dyn Engine, console: &mut Console<'_>) -> Result<Verdict, Failure> {
-    let folder = plan::folder(&args.plan)?;
+    let folder = plan::folder(&args.plan.job)?;
     let mut set = OutputSet::open(&folder)?;
     let path = folder.join("trace.csv");
     let mut trace = Watched { inner: set.stream("trace.csv")?, refused: None };

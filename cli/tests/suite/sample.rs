@@ -2,10 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use cli::engine::Outcome;
+use cli::engine::{Compared, Outcome};
 use cli::json::{
-    AxisJson, BindingJson, BoxJson, BusJson, CertificateJson, FeedNotReachedJson, FilesJson, NoteJson,
-    PlanJson, SimulationJson,
+    AxisJson, BindingJson, BoxJson, BusJson, CertificateJson, CompareFilesJson, CompareJson,
+    FeedNotReachedJson, FilesJson, MethodJson, MethodState, NoteJson, PlanJson, SimulationJson,
+    WayPointsJson,
 };
 use cli::report::model::{
     Axis, Bounds, Certificate, ContourError, Counts, DriveEnd, Limit, Mode, Planning, Ratios, Report, Share,
@@ -302,6 +303,7 @@ fn finish(axes: Vec<Axis>, recorder: Recorder, cycle_s: f64, motion_s: f64) -> R
     ];
     Report {
         job: "lissajous.ngc".into(),
+        way_points: None,
         machine: "three-axis mill".into(),
         times: Times {
             cycle_s,
@@ -398,6 +400,8 @@ pub(crate) fn outcome(simulated: bool) -> Outcome {
     let c = report.counts;
     let json = PlanJson {
         job: report.job.clone(),
+        job_kind: "program",
+        way_points: None,
         machine: report.machine.clone(),
         axes: report.axes.iter().map(|a| AxisJson { name: a.name.clone(), unit: a.unit.clone() }).collect(),
         blocks: c.blocks,
@@ -439,11 +443,70 @@ pub(crate) fn outcome(simulated: bool) -> Outcome {
         plan_seconds: 0.412,
         peak_memory_mib: Some(48.0),
         solver: "interior-point".into(),
+        jerk_form: "true".into(),
+        windows: "overlap".into(),
         iterations: report.planning.iterations,
+        gap_estimate: Some(7e-6),
         certificate: report.certificate.verdict,
         simulation: simulated.then_some(simulation),
         notes: report.notes.clone(),
         files: FilesJson::default(),
     };
     Outcome { json, report, feed: b"a feed table".to_vec() }
+}
+
+/// A comparison of five methods, two of them without a motion.
+pub(crate) fn compared() -> Compared {
+    let report = report(Kind::Flat, 1);
+    let method = |name: &str, share: f64| MethodJson {
+        method: name.into(),
+        state: MethodState::Planned,
+        solver: Some("interior-point".into()),
+        jerk_form: "true".into(),
+        windows: Some("whole".into()),
+        compute_seconds: Some(0.0125),
+        traverse_time_s: Some(12.5 * (1.0 + share)),
+        over_whole: Some(share),
+        certified: Some(true),
+        velocity_ratio: Some(0.91),
+        acceleration_ratio: Some(0.999_9),
+        jerk_ratio: Some(0.999_8),
+        feed_ratio: None,
+        spans: Some(3059),
+        iterations: Some(84),
+        gap_estimate: Some(7e-6),
+        constant_feed_mm_s: None,
+        lost_s: None,
+        binding: vec![BindingJson { kind: "jerk", axis: Some("X".into()), seconds: 12.5, share: 1.0 }],
+        remark: None,
+    };
+    let bare = |name: &str, state| MethodJson { method: name.into(), state, ..MethodJson::default() };
+    let sweep = MethodJson { traverse_time_s: Some(11.0), ..bare("sweep", MethodState::Timed) };
+    let remark = Some("takes minutes on a path this long; name it with --methods".into());
+    let clarabel = MethodJson { remark, ..bare("clarabel", MethodState::LeftOut) };
+    let collocation =
+        MethodJson { certified: Some(false), jerk_ratio: Some(2.4), ..method("collocation", -0.02) };
+    let motion = Some(report.motion.clone());
+    Compared {
+        json: CompareJson {
+            job: "jobs/points.csv".into(),
+            job_kind: "way-points",
+            way_points: Some(WayPointsJson { count: 3000, ends: "not-a-knot".into(), knots: "chord".into() }),
+            machine: report.machine.clone(),
+            axes: report
+                .axes
+                .iter()
+                .map(|a| AxisJson { name: a.name.clone(), unit: a.unit.clone() })
+                .collect(),
+            feed_length_mm: 860.0,
+            sections: 1,
+            geometry_spans: 2997,
+            threads: 2,
+            methods: vec![method("whole", 0.0), method("zhao", 2e-4), sweep, clarabel, collocation],
+            peak_memory_mib: Some(40.0),
+            files: CompareFilesJson::default(),
+        },
+        axes: report.axes,
+        motions: vec![motion.clone(), motion.clone(), None, None, motion],
+    }
 }

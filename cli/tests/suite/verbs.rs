@@ -5,8 +5,8 @@ use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
-use cli::args::{PlanArgs, RunArgs};
-use cli::engine::{Engine, Outcome};
+use cli::args::{CompareArgs, PlanArgs, RunArgs};
+use cli::engine::{Compared, Engine, Outcome};
 use cli::failure::Failure;
 use cli::json::{AxisRatiosJson, CertificateJson, InspectAxisJson, InspectJson, VerifyJson};
 use cli::progress::Progress;
@@ -51,6 +51,15 @@ impl Engine for Scripted {
     fn run(&self, args: &RunArgs, trace: &mut dyn Write, _: &mut Progress) -> Result<Outcome, Failure> {
         writeln!(trace, "every,{:?}", args.trace_every).map_err(|e| Failure::internal(e.to_string()))?;
         self.outcome(true)
+    }
+
+    fn compare(&self, _: &CompareArgs, _: &mut Progress) -> Result<Compared, Failure> {
+        let mut compared = sample::compared();
+        self.outcome(false)?;
+        if !self.holds {
+            compared.json.methods[1].certified = Some(false);
+        }
+        Ok(compared)
     }
 
     fn verify(&self, file: &Path, _: &mut Progress) -> Result<VerifyJson, Failure> {
@@ -154,10 +163,10 @@ fn field_names_of_plan_and_run_are_pinned() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().to_str().unwrap();
     let run = json(&say(&GOOD, &["run", "part.ngc", "--json", "-o", folder]));
-    let mut expected: Vec<&str> = "job machine axes blocks rapids lines arcs splines dwells stops stops_by_cause feed_length_mm \
+    let mut expected: Vec<&str> = "job job_kind way_points machine axes blocks rapids lines arcs splines dwells stops stops_by_cause feed_length_mm \
         rapid_length_mm bounding_box_mm tolerance_mm tolerance_source max_deviation_mm cycle_time_s motion_time_s \
         constant_feed_time_s stop_every_block_time_s binding feed_not_reached operations spans table_bytes plan_seconds \
-        peak_memory_mib solver iterations certificate simulation notes files"
+        peak_memory_mib solver jerk_form windows iterations gap_estimate certificate simulation notes files"
         .split_whitespace()
         .collect();
     expected.sort_unstable();
@@ -202,6 +211,79 @@ fn field_names_of_plan_and_run_are_pinned() {
 }
 
 #[test]
+fn field_names_of_compare_and_sample_are_pinned() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().to_str().unwrap();
+    let compare = json(&say(&GOOD, &["compare", "points.csv", "--json", "-o", folder]));
+    let expected = "axes feed_length_mm files geometry_spans job job_kind machine methods peak_memory_mib sections \
+                    threads way_points";
+    assert_eq!(keys(&compare), expected.split_whitespace().collect::<Vec<_>>());
+    let expected = "acceleration_ratio binding certified compute_seconds constant_feed_mm_s feed_ratio gap_estimate \
+                    iterations jerk_form jerk_ratio lost_s method over_whole remark solver spans state \
+                    traverse_time_s velocity_ratio windows";
+    assert_eq!(keys(&compare["methods"][0]), expected.split_whitespace().collect::<Vec<_>>());
+    assert_eq!(keys(&compare["way_points"]), ["count", "ends", "knots"]);
+    assert_eq!(keys(&compare["files"]), ["compare", "report"]);
+    let states: Vec<&Value> =
+        compare["methods"].as_array().unwrap().iter().map(|method| &method["state"]).collect();
+    assert_eq!(states, ["planned", "planned", "timed", "left_out", "planned"]);
+    let file = home.path().join("cat.csv");
+    let written = json(&say(&GOOD, &["sample", "cat", "--json", "-o", file.to_str().unwrap()]));
+    assert_eq!(keys(&written), ["file", "file_bytes", "points"]);
+}
+
+#[test]
+fn compare_writes_its_page_and_its_object() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("out");
+    let words = ["compare", "points.csv", "-o", folder.to_str().unwrap()];
+    let said = say(&GOOD, &words);
+    assert_eq!((said.status, said.err.as_str()), (0, ""));
+    assert_eq!(names(&folder), ["compare.html", "compare.json"]);
+    for part in ["whole", "zhao", "sweep", "left out: takes minutes", "12.5", "compare.html"] {
+        assert!(said.out.contains(part), "{part} in {}", said.out);
+    }
+    let told = json(&say(&GOOD, &[&words[..], &["--json"]].concat()));
+    let file: Value = serde_json::from_slice(&fs::read(folder.join("compare.json")).unwrap()).unwrap();
+    assert_eq!(told, file);
+}
+
+#[test]
+fn compare_fails_with_a_method_that_breaks_its_promise_but_not_with_one_that_makes_none() {
+    let home = tempfile::tempdir().unwrap();
+    let words = ["compare", "points.csv", "-o", home.path().to_str().unwrap()];
+    // The sample's collocation is not certified either way.
+    assert_eq!(say(&GOOD, &words).status, 0);
+    let broken = say(&BROKEN, &words);
+    assert_eq!(broken.status, 1);
+    assert!(broken.out.contains("NO"), "{}", broken.out);
+    assert_eq!(names(home.path()), ["compare.html", "compare.json"]);
+}
+
+#[test]
+fn sample_writes_what_it_is_asked_for() {
+    let home = tempfile::tempdir().unwrap();
+    let file = home.path().join("deep/tooth.csv");
+    let words = ["sample", "tooth", "--rows", "3", "--points", "7", "-o", file.to_str().unwrap()];
+    assert_eq!(say(&GOOD, &words).status, 0);
+    let text = fs::read_to_string(&file).unwrap();
+    assert_eq!((text.lines().next(), text.lines().count()), (Some("X [mm],Y [mm],Z [mm]"), 22));
+    for bad in [
+        &["cat", "--rows", "3"][..],
+        &["cat", "--points", "1"],
+        &["tooth", "--rows", "0"],
+        &["tooth", "--rows", "100000", "--points", "1000"],
+        &["tooth", "-o", ".."],
+        &["dog"],
+    ] {
+        let words = [&["sample", "--json"], bad].concat();
+        let said = say(&GOOD, &words);
+        assert_eq!((said.status, &json(&said)["error"]["kind"]), (2, &"input".into()), "{bad:?}");
+    }
+    assert_eq!(names(home.path()), ["deep"]);
+}
+
+#[test]
 fn field_names_of_verify_and_inspect_are_pinned() {
     let verify = json(&say(&GOOD, &["verify", "a.feed", "--json"]));
     let expected = "axes certificate fault_count faults file motion_time_s sections spans verify_seconds";
@@ -237,6 +319,9 @@ fn the_documentation_explains_every_field_and_no_other() {
     let folder = home.path().to_str().unwrap();
     let mut found = BTreeSet::new();
     fields(&json(&say(&GOOD, &["run", "part.ngc", "--json", "-o", folder])), &mut found);
+    fields(&json(&say(&GOOD, &["compare", "points.csv", "--json", "-o", folder])), &mut found);
+    let file = home.path().join("cat.csv");
+    fields(&json(&say(&GOOD, &["sample", "cat", "--json", "-o", file.to_str().unwrap()])), &mut found);
     fields(&json(&say(&GOOD, &["verify", "a.feed", "--json"])), &mut found);
     fields(&json(&say(&GOOD, &["inspect", "a.feed", "--json"])), &mut found);
     fields(&json(&say(&BAD_INPUT, &["plan", "part.ngc", "--json", "-o", folder])), &mut found);
@@ -254,7 +339,7 @@ fn the_documentation_explains_every_field_and_no_other() {
 fn bad_input_is_status_two_with_a_diagnostic_and_no_file() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().join("deep/out");
-    for verb in ["plan", "run"] {
+    for verb in ["plan", "run", "compare"] {
         let said = say(&BAD_INPUT, &[verb, "part.ngc", "-o", folder.to_str().unwrap()]);
         assert_eq!((said.status, said.out.as_str()), (2, ""));
         assert!(said.err.contains("part.ngc:7:5: feed is zero"), "{}", said.err);

@@ -23,7 +23,7 @@ struct Calls {
 }
 
 fn stream(axes: usize, geometry: usize) -> Calls {
-    let (path, limits) = (paths::meander(axes, geometry), paths::limits(axes));
+    let (path, limits) = (paths::random_spline(axes, geometry), paths::limits(axes));
     let (start, pieces) = pieces(&path, &[], 4);
     let mut horizon =
         Horizon::new(&start, &limits, 1e-3, HorizonSettings::default()).expect("sound limits have a horizon");
@@ -76,7 +76,7 @@ pub(crate) fn streamed(c: &mut Criterion) {
 /// A table planned anew from its middle on under 20 % lower and 20 % higher limits.
 pub(crate) fn retimed(c: &mut Criterion) {
     for axes in [3, 7] {
-        let (path, limits) = (paths::meander(axes, 130), paths::limits(axes));
+        let (path, limits) = (paths::random_spline(axes, 130), paths::limits(axes));
         let problem = Problem { path: &path, limits: &limits, caps: &[], control_tick_s: 1e-3 };
         let table =
             planner::topp::plan(&problem, &Settings::default()).expect("a smooth path has a plan").table;
@@ -84,7 +84,7 @@ pub(crate) fn retimed(c: &mut Criterion) {
         let old = Rules { limits: &limits, caps: &[] };
         let mut group = c.benchmark_group(format!("{axes} axes"));
         for factor in [0.8, 1.2] {
-            let mut other = limits.clone();
+            let mut other = limits.to_vec();
             other.iter_mut().for_each(|l| l.velocity *= factor);
             let new = Rules { limits: &other, caps: &[] };
             let again = || retime(black_box(&table), knot, old, new, 1e-3, 1e-5, Deadline::NONE);
@@ -107,7 +107,7 @@ pub(crate) fn retimed(c: &mut Criterion) {
 
 /// A long path whole, in overlapping windows and spliced as in [Zhao2016 3.2]: once each, with the time lost.
 pub(crate) fn divided(_: &mut Criterion) {
-    let (path, limits) = (paths::meander(3, DIVIDED), paths::limits(3));
+    let (path, limits) = (paths::random_spline(3, DIVIDED), paths::limits(3));
     let problem = Problem { path: &path, limits: &limits, caps: &[], control_tick_s: 1e-3 };
     let mut least = f64::INFINITY;
     for windows in [Windows::Whole, Windows::Overlap, Windows::Zhao] {

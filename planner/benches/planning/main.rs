@@ -19,7 +19,7 @@ use planner::job::machine::{LimitSet, Machine};
 use planner::job::program::Item;
 use planner::topp;
 use planner::topp::problem::{Problem, Settings, Solver};
-use planner::topp::sweep::Sweep;
+use planner::topp::sweep::{Samples, Sweep, Sweeper};
 
 const MACHINE: &str = include_str!("../../../jobs/mill3.toml");
 const RASTER: &str = include_str!("../../../jobs/wave.ngc");
@@ -27,8 +27,11 @@ const RASTER: &str = include_str!("../../../jobs/wave.ngc");
 /// How often the program repeats.
 const REPEATS: usize = 20;
 
-/// Axes and geometry spans of the paths to plan on.
-const SIZES: [(usize, usize); 3] = [(3, 125), (3, 420), (7, 350)];
+/// Axes and geometry spans of the paths to plan on: about 300, 1000 and 1000 spans of q.
+const SIZES: [(usize, usize); 3] = [(3, 30), (3, 100), (7, 100)];
+
+/// Axes and stations of sweeps.
+const SWEEPS: [(usize, usize); 3] = [(3, 10_000), (7, 1_000), (7, 10_000)];
 
 fn machine() -> Machine {
     Machine::from_toml(MACHINE, "mill3.toml").expect("the sample machine is sound")
@@ -69,7 +72,7 @@ fn program(c: &mut Criterion) {
 /// Per span of q: the whole plan by either solver, and the parts of it that can be had alone.
 fn plan(c: &mut Criterion) {
     for (axes, geometry) in SIZES {
-        let path = paths::meander(axes, geometry);
+        let path = paths::random_spline(axes, geometry);
         let limits = paths::limits(axes);
         let problem = Problem { path: &path, limits: &limits, caps: &[], control_tick_s: 1e-3 };
         let of = |solver| Settings { solver, ..Settings::default() };
@@ -100,6 +103,28 @@ fn plan(c: &mut Criterion) {
     }
 }
 
+/// Per station: sampling the path, and the sweep of the samples in memory used before.
+fn sweep(c: &mut Criterion) {
+    for (axes, stations) in SWEEPS {
+        let path = paths::random_spline(axes, stations / 100);
+        let limits = paths::limits(axes);
+        let samples = Samples::uniform(&path, stations).expect("the path is sound");
+        let mut sweeper = Sweeper::new();
+        let mut group = c.benchmark_group(format!("sweep, {axes} axes"));
+        group.throughput(Throughput::Elements(stations as u64));
+        group.bench_function(BenchmarkId::new("sample", stations), |b| {
+            b.iter(|| Samples::uniform(black_box(&path), stations));
+        });
+        group.bench_function(BenchmarkId::new("passes", stations), |b| {
+            b.iter(|| {
+                let q = sweeper.sweep(black_box(&samples), &limits).expect("the limits are sound");
+                black_box(q[stations / 2])
+            });
+        });
+        group.finish();
+    }
+}
+
 fn short() -> Criterion {
     Criterion::default()
         .sample_size(10)
@@ -108,5 +133,9 @@ fn short() -> Criterion {
         .without_plots()
 }
 
-criterion_group!(name = benches; config = short(); targets = program, plan, horizon::streamed, horizon::retimed, horizon::divided);
+criterion_group!(
+    name = benches;
+    config = short();
+    targets = program, sweep, plan, horizon::streamed, horizon::retimed, horizon::divided
+);
 criterion_main!(benches);

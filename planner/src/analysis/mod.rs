@@ -10,3 +10,4 @@ pub mod operations;
 #[cfg(test)]
 pub(crate) mod samples;
 pub mod shortfall;
+pub mod steady;

@@ -143,6 +143,31 @@ impl<'m> WayPoints<'m> {
         point
     }
 
+    /// Line of the file that holds way-point `i`, from 1.
+    ///
+    /// # Panics
+    /// If `i` is not below [`count`](Self::count).
+    pub fn line(&self, i: usize) -> u32 {
+        self.lines[i]
+    }
+
+    /// Mask of the axes that a feed is about: the linear ones, or the rotary ones if no other has a column.
+    pub fn counted(&self) -> u16 {
+        let counted = if self.has_linear() { AxisKind::Linear } else { AxisKind::Rotary };
+        let axes = self.machine.axes.iter().enumerate().filter(|(_, a)| a.kind == counted);
+        axes.fold(0, |mask, (i, _)| mask | 1 << i)
+    }
+
+    /// dr/du along the first and the last chord: end slopes of a clamped spline when nothing better is known.
+    pub fn end_chords(&self, knots: Knots) -> [Point; 2] {
+        let lengths = knots.lengths(&self.distances(&self.weights()));
+        let last = lengths.len() - 1;
+        [0, last].map(|i| {
+            let (from, to) = (self.point(i), self.point(i + 1));
+            std::array::from_fn(|axis| (to[axis] - from[axis]) / lengths[i])
+        })
+    }
+
     fn row(&self, i: usize) -> &[f64] {
         &self.values[i * self.axes.len()..(i + 1) * self.axes.len()]
     }

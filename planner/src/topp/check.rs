@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::layout::{Layout, Pieces};
+use super::layout::Layout;
 use super::problem::Binding;
-use super::rows::{CellRows, RowSource, Source, dot};
+use super::rows::{CellRows, RowBuilder, RowSource, Source, dot};
 use crate::feed::table::{FeedTable, SpanLaw};
 
 /// Inner spans checked by one task.
@@ -36,7 +36,7 @@ pub(super) fn rows(source: &RowSource, x: &[f64], half: &[f64]) -> Findings {
     let parts: Vec<Findings> = starts
         .par_iter()
         .map(|&from| {
-            let mut pieces = Pieces::new(source.problem.path);
+            let mut builder = RowBuilder::new(source);
             let mut cell = CellRows::default();
             let mut part = Findings { worst: 0.0, span: from + 1, binding: Vec::new() };
             for s in from..(from + CHUNK).min(m) {
@@ -45,7 +45,7 @@ pub(super) fn rows(source: &RowSource, x: &[f64], half: &[f64]) -> Findings {
                 let half = [get(half, s), get(half, s + 1), get(half, s + 2)];
                 let mut nearest = Nearest::default();
                 for k in 0..usize::from(source.layout.cells[s + 1]) {
-                    source.cell(s, k, &mut pieces, &mut cell);
+                    builder.cell(s, k, &mut cell);
                     nearest.cell(&cell, &c, &half);
                 }
                 if nearest.worst > part.worst || nearest.worst.is_nan() {
@@ -78,28 +78,22 @@ struct Nearest {
 impl Nearest {
     fn cell(&mut self, rows: &CellRows, c: &[f64; 3], half: &[f64; 3]) {
         let loss = |a: &[f64; 3]| a[0].abs() * half[0] + a[1].abs() * half[1] + a[2].abs() * half[2];
-        for (a, source) in &rows.upper {
-            let by = match *source {
-                Source::Velocity(axis) => Some(Binding::Velocity(axis)),
-                Source::Feed => Some(Binding::Feed),
-                Source::Rest => Some(Binding::Rest),
-                Source::Format => None,
-            };
-            self.note(dot(a, c), loss(a), by);
+        for row in rows.upper.iter().filter(|row| row.bound > 0.0) {
+            self.note(dot(&row.a, c), loss(&row.a), binding(row.source));
         }
-        for (a, axis) in &rows.acceleration {
-            self.note(dot(a, c).abs(), loss(a), Some(Binding::Acceleration(*axis)));
+        for (a, source) in rows.pairs() {
+            self.note(dot(&a, c).abs(), loss(&a), binding(source));
         }
-        if rows.jerk.is_empty() {
+        if rows.jerks.is_empty() {
             return;
         }
         let x = rows.x.map(|x| dot(&x, c));
         self.worst = self.worst.max(tangent_bound(rows, c, &x));
-        for (f, (a, axis)) in rows.jerk.iter().enumerate() {
+        for (a, k, axis) in rows.forces() {
             // The jerk itself, at the ends of the cell and, by the middle coefficient, in between.
-            let root = x[f % 3].max(0.0).sqrt();
-            let used = dot(a, c).abs() * root;
-            self.nearest(used + loss(a) * root, Some(Binding::Jerk(*axis)));
+            let root = x[k].max(0.0).sqrt();
+            let used = dot(&a, c).abs() * root;
+            self.nearest(used + loss(&a) * root, Some(Binding::Jerk(axis)));
         }
     }
 
@@ -119,15 +113,32 @@ impl Nearest {
     }
 }
 
+/// The ruling that a row at its bound stands for.
+fn binding(source: Source) -> Option<Binding> {
+    match source {
+        Source::Velocity(axis) => Some(Binding::Velocity(axis)),
+        Source::Acceleration(axis) => Some(Binding::Acceleration(axis)),
+        Source::Jerk(axis) => Some(Binding::Jerk(axis)),
+        Source::Feed => Some(Binding::Feed),
+        Source::Rest => Some(Binding::Rest),
+        Source::Format | Source::Bend => None,
+    }
+}
+
 /// The largest jerk row at the tangent that makes it smallest: convex in s, golden section.
 fn tangent_bound(rows: &CellRows, c: &[f64; 3], x: &[f64; 3]) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let mut force = [0.0f64; 3];
-    for (i, (a, _)) in rows.jerk.iter().enumerate() {
-        force[i % 3] = force[i % 3].max(dot(a, c).abs());
+    for (a, k, _) in rows.forces() {
+        force[k] = force[k].max(dot(&a, c).abs());
     }
     let at =
         |s: f64| (0..3).map(|k| force[k] / (1.5 * s) + s * s / 3.0 * x[k]).fold(f64::NEG_INFINITY, f64::max);
+    // Most cells are well inside at the mean of x already.
+    let plain = at((3.0 / (x[0] + x[1] + x[2]).max(f64::MIN_POSITIVE)).sqrt());
+    if plain <= 1.0 {
+        return plain;
+    }
     let low = x.iter().copied().fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE);
     let high = x.iter().copied().fold(0.0, f64::max).max(f64::MIN_POSITIVE);
     let (mut a, mut b) = (0.5 / high.sqrt(), 2.0 / low.sqrt());
@@ -155,7 +166,7 @@ pub(super) fn format(layout: &Layout, table: &FeedTable) -> Option<Vec<u32>> {
         let law = table.law(i);
         let seconds = law.duration();
         if seconds >= LONGEST_S {
-            *part = (seconds / DIVIDED_S).ceil().min(1e6) as u32;
+            *part = ((seconds / DIVIDED_S).ceil().min(1e6) as u32).next_power_of_two();
             sound = false;
         }
         if let SpanLaw::Quadratic { h, q: [alpha, beta, gamma] } = law {
@@ -165,7 +176,7 @@ pub(super) fn format(layout: &Layout, table: &FeedTable) -> Option<Vec<u32>> {
             if curved > MOST_CURVED || alpha <= 0.0 || end <= 0.0 {
                 // At the same q, the argument falls with the square of the length.
                 let parts = (1.2 * (curved / MOST_CURVED).sqrt()).ceil().clamp(2.0, 8.0);
-                *part = (*part).max(parts as u32);
+                *part = (*part).max((parts as u32).next_power_of_two());
                 sound = false;
             }
         }

@@ -6,8 +6,7 @@
 use ::clarabel::algebra::CscMatrix;
 use ::clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
 
-use super::layout::Pieces;
-use super::rows::{CellRows, RowSource, dot};
+use super::rows::{CellRows, RowBuilder, RowSource, dot};
 
 /// Linear programmes after the first.
 const MOST_STEPS: usize = 8;
@@ -19,11 +18,20 @@ struct Programme {
     cells: Vec<Cell>,
 }
 
-/// The jerk rows of one cell: both signs of Bernstein coefficients 0, 1, 2, 0, ...
+/// The jerk rows of one cell, both signs in turn.
 struct Cell {
     span: usize,
     rows: std::ops::Range<usize>,
+    /// Bernstein coefficient of each pair.
+    coefficients: Vec<usize>,
     x: [[f64; 3]; 3],
+}
+
+/// The best control values, the iterations of all programmes, and the last gain, as the kernel counts time.
+pub(super) struct Best {
+    pub(super) x: Vec<f64>,
+    pub(super) iterations: u64,
+    pub(super) gap: f64,
 }
 
 /// An answer: control values, one multiplier per row, iterations.
@@ -42,20 +50,14 @@ enum Jerk<'a> {
     Tangent(&'a [f64]),
 }
 
-/// Solves from the swept q* (`swept`, as x per inner span); returns control values and iterations.
-pub(super) fn solve(
-    source: &RowSource,
-    swept: &[f64],
-    start: &[f64],
-    half: &[f64],
-    relative_gap: f64,
-) -> Option<(Vec<f64>, u64)> {
+/// Solves from the start profile.
+pub(super) fn solve(source: &RowSource, start: &[f64], half: &[f64], relative_gap: f64) -> Option<Best> {
     let (mut best, mut best_time): (Option<Vec<f64>>, f64) = (None, f64::INFINITY);
-    let mut iterations = 0;
+    let (mut iterations, mut gap) = (0, f64::INFINITY);
     let mut at = start.to_vec();
     let mut tangents = Vec::new();
     for step in 0..=MOST_STEPS {
-        let jerk = if step == 0 { Jerk::Pseudo(swept) } else { Jerk::Tangent(&tangents) };
+        let jerk = if step == 0 { Jerk::Pseudo(source.swept) } else { Jerk::Tangent(&tangents) };
         let programme = Programme::new(source, half, jerk);
         let (_, gradient) = time(source, &at);
         let Some(answer) = programme.solve(&gradient) else { break };
@@ -66,17 +68,20 @@ pub(super) fn solve(
         if !seconds.is_finite() {
             break;
         }
-        let gain = (best_time - seconds) / seconds;
+        let gain = best_time - seconds;
+        if gain.is_finite() {
+            gap = gain.abs();
+        }
         if seconds < best_time {
             best_time = seconds;
             best = Some(x.clone());
         }
         at = x;
-        if step > 0 && gain.abs() < relative_gap {
+        if step > 0 && gain.abs() < relative_gap * seconds {
             break;
         }
     }
-    best.map(|x| (x, iterations))
+    best.map(|x| Best { x, iterations, gap })
 }
 
 /// Controls of inner span `s`; zero outside.
@@ -116,12 +121,12 @@ fn time(source: &RowSource, x: &[f64]) -> (f64, Vec<f64>) {
 impl Programme {
     fn new(source: &RowSource, half: &[f64], jerk: Jerk) -> Self {
         let mut programme = Programme::default();
-        let mut pieces = Pieces::new(source.problem.path);
+        let mut builder = RowBuilder::new(source);
         let mut cell = CellRows::default();
         for s in 0..half.len() {
             let half = controls(half, s);
             for k in 0..usize::from(source.layout.cells[s + 1]) {
-                source.cell(s, k, &mut pieces, &mut cell);
+                builder.cell(s, k, &mut cell);
                 programme.cell(s, &cell, &half, jerk);
             }
         }
@@ -142,22 +147,25 @@ impl Programme {
                 (1.0 / (1.5 * tangent), tangent * tangent / 3.0)
             }
         };
-        for (a, _) in &cell.upper {
-            add(*a, 1.0, loss(a));
+        for row in &cell.upper {
+            add(row.a, row.bound, row.bound * loss(&row.a));
         }
-        for (a, _) in &cell.acceleration {
-            add(*a, 1.0, loss(a));
-            add(a.map(|v| -v), 1.0, loss(a));
+        for (a, _) in cell.pairs() {
+            add(a, 1.0, loss(&a));
+            add(a.map(|v| -v), 1.0, loss(&a));
         }
-        for (i, (f, _)) in cell.jerk.iter().enumerate() {
-            let x = &cell.x[i % 3];
+        let (mut count, mut coefficients) = (0, Vec::new());
+        for (f, k, _) in cell.forces() {
+            let x = &cell.x[k];
             for sign in [alpha, -alpha] {
                 let a = [0, 1, 2].map(|j| sign * f[j] + beta * x[j]);
-                add(a, 1.0, alpha * loss(f) + beta * loss(x));
+                add(a, 1.0, alpha * loss(&f) + beta * loss(x));
             }
+            count += 2;
+            coefficients.push(k);
         }
         let end = self.rows.len();
-        self.cells.push(Cell { span: s, rows: end - 2 * cell.jerk.len()..end, x: cell.x });
+        self.cells.push(Cell { span: s, rows: end - count..end, coefficients, x: cell.x });
     }
 
     /// The next tangents: at the mean of x weighted by the multipliers, which is where the optimum has them; at the
@@ -171,7 +179,7 @@ impl Programme {
             let (mut weight, mut moment) = (3.0 * floor, floor * b.iter().sum::<f64>());
             for (i, z) in multipliers[cell.rows.clone()].iter().enumerate() {
                 weight += z.max(0.0);
-                moment += z.max(0.0) * b[i / 2 % 3];
+                moment += z.max(0.0) * b[cell.coefficients[i / 2]];
             }
             (weight / moment).sqrt()
         };

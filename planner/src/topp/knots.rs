@@ -6,7 +6,7 @@ use super::problem::{Problem, Settings};
 use super::rounding;
 use super::sweep::Sweep;
 use crate::feed::table::MIN_SPANS;
-use crate::geometry::grid_path::GridPath;
+use crate::geometry::grid_path::{GridPath, Piece};
 use crate::job::machine::AxisLimits;
 
 /// Spans next to each other grow by at most this away from a rest.
@@ -168,8 +168,9 @@ struct Estimate<'a> {
 impl<'a> Estimate<'a> {
     fn new(problem: &Problem<'a>, settings: &Settings, sweep: &'a Sweep) -> Self {
         let path = problem.path;
-        let ramp_s = ramp(problem, sweep);
-        let (rest, end_jerk) = rest_lengths(problem, sweep, ramp_s);
+        let ramps = ramps(problem, sweep);
+        let ramp_s = ramps.iter().copied().fold(f64::INFINITY, f64::min);
+        let (rest, end_jerk) = rest_lengths(problem, sweep, &ramps);
         let u = &sweep.stations;
         let length = path.length();
         // Away from rest under constant jerk: q = (6^(4/3)/4) (J/|p'|)^(2/3) u^(4/3).
@@ -197,9 +198,18 @@ impl<'a> Estimate<'a> {
         }
         let total = clock[clock.len() - 1];
         let fewest = if total < 4.0 * ramp_s { FEWEST_ALL_JERK } else { FEWEST_SPANS };
-        let target = (ramp_s / settings.spans_per_ramp).min(total / fewest);
-        let idle = idle_time(&clock, &speed, u, problem, sweep);
-        let allowed = |k: usize| (target + 0.4 * (idle[k] - 1.5 * ramp_s).max(0.0)).min(LONGEST_S);
+        let eventful = eventful(&speed, problem, sweep);
+        let longest = total / fewest;
+        let wanted: Vec<f64> = ramps
+            .iter()
+            .zip(eventful)
+            .map(|(ramp, eventful)| match eventful {
+                true => (ramp / settings.spans_per_ramp).min(longest),
+                false => f64::INFINITY,
+            })
+            .collect();
+        let allowed = spread(&wanted, &clock, settings.spans_per_ramp);
+        let allowed = |k: usize| allowed[k].min(LONGEST_S);
         let graded = GROWTH.ln() / (GROWTH - 1.0);
         let mut count = vec![0.0];
         for k in 1..u.len() {
@@ -272,42 +282,66 @@ impl<'a> Estimate<'a> {
     }
 }
 
-/// The time scale of speed changes: what the quickest axis needs to build up its acceleration, but no less than a
-/// share of what it needs to gain its speed: a jerk limit that hardly matters asks for no finer knots.
-fn ramp(problem: &Problem, sweep: &Sweep) -> f64 {
+/// The time scale of speed changes at each station: what the path acceleration needs to build up, but no less than a
+/// share of what the top speed needs to be gained: a jerk limit that hardly matters asks for no finer knots.
+///
+/// Which axis limits the acceleration and which the jerk depends on the direction: a quick axis beside a slow one
+/// asks for nothing.
+fn ramps(problem: &Problem, sweep: &Sweep) -> Vec<f64> {
     const SPEED_RAMP_SHARE: f64 = 0.08;
-    let top = sweep.top_speeds(problem);
-    let ramp = problem
-        .limits
-        .iter()
-        .zip(top)
-        .filter(|(_, top)| *top > 0.0)
-        .map(|(l, top)| (l.acceleration / l.jerk).max(SPEED_RAMP_SHARE * top / l.acceleration))
-        .fold(f64::INFINITY, f64::min);
+    let top = sweep.top().sqrt();
     let swept = sweep.duration();
-    if ramp.is_finite() { ramp.max(problem.control_tick_s).max(1e-6 * swept) } else { 0.1 * swept }
+    let least = problem.control_tick_s.max(1e-6 * swept);
+    each_station(problem, sweep, |axes, x| {
+        let [acceleration, jerk] = along(axes, x, problem.limits);
+        let ramp = (acceleration / jerk).max(SPEED_RAMP_SHARE * top / acceleration);
+        if ramp.is_finite() { ramp.max(least) } else { 0.1 * swept }
+    })
+}
+
+/// Largest acceleration and jerk along the path at `x` of a geometry span, if it were straight.
+fn along(axes: &[Piece], x: f64, limits: &[AxisLimits]) -> [f64; 2] {
+    let mut most = [f64::INFINITY; 2];
+    for (piece, l) in axes.iter().zip(limits) {
+        let slope = piece.first(x).abs();
+        if slope > 0.0 {
+            most = [most[0].min(l.acceleration / slope), most[1].min(l.jerk / slope)];
+        }
+    }
+    most
+}
+
+/// A value for each station of the sweep, from the pieces there and the place within them.
+fn each_station(problem: &Problem, sweep: &Sweep, mut f: impl FnMut(&[Piece], f64) -> f64) -> Vec<f64> {
+    let path = problem.path;
+    let per_span = (sweep.stations.len() - 1) / path.spans();
+    let mut pieces = Pieces::new(path);
+    let station = |(k, u): (usize, &f64)| {
+        let g = (k / per_span).min(path.spans() - 1);
+        f(pieces.at(g), u - path.breaks[g] as f64 * path.step)
+    };
+    sweep.stations.iter().enumerate().map(station).collect()
 }
 
 /// Wanted lengths of both rest spans, and J/|p'| at both ends.
-fn rest_lengths(problem: &Problem, sweep: &Sweep, ramp_s: f64) -> ([f64; 2], [f64; 2]) {
+fn rest_lengths(problem: &Problem, sweep: &Sweep, ramp_s: &[f64]) -> ([f64; 2], [f64; 2]) {
     let path = problem.path;
     let mut pieces = Pieces::new(path);
     let mut ends = [(0.0, 0.0); 2];
     let last = path.spans() - 1;
-    for (end, (g, far)) in ends.iter_mut().zip([(0, false), (last, true)]) {
-        let (mut length, mut jerk) = (path.length() / 12.0, f64::INFINITY);
-        for (piece, l) in pieces.at(g).iter().zip(problem.limits) {
-            let slope = piece.first(if far { piece.length } else { 0.0 }).abs();
-            if slope == 0.0 {
-                continue;
-            }
-            // Acceleration saturates exactly at the joint: A^3/(6 J^2 |p'|) = A T^2/(6 |p'|) with T = A/J; where
-            // jerk hardly matters, T is two ticks or a small share of the ramp.
-            let t = (l.acceleration / l.jerk).max(0.05 * ramp_s).max(2.0 * problem.control_tick_s);
-            length = length.min(l.acceleration * t * t / (6.0 * slope));
-            jerk = jerk.min(l.jerk / slope);
+    let end_station = sweep.stations.len() - 1;
+    for (end, (g, k, far)) in ends.iter_mut().zip([(0, 0, false), (last, end_station, true)]) {
+        let axes = pieces.at(g);
+        let x = if far { axes[0].length } else { 0.0 };
+        let [acceleration, jerk] = along(axes, x, problem.limits);
+        let mut length = path.length() / 12.0;
+        if acceleration.is_finite() {
+            // Acceleration saturates exactly at the joint: J T^3/6 with T = A/J along the path; where jerk hardly
+            // matters, T is two ticks or a small share of the ramp.
+            let t = (acceleration / jerk).max(0.05 * ramp_s[k]).max(2.0 * problem.control_tick_s);
+            length = length.min(acceleration / t * t.min(LONGEST_S).powi(3) / 6.0);
         }
-        let q = sweep.constant[if far { sweep.constant.len() - 1 } else { 0 }];
+        let q = sweep.constant[k];
         // A cap may be reached before acceleration saturates: half of the speed is then gained at full jerk.
         let half_ramp = q.sqrt() * (q.sqrt() / jerk).sqrt() / 6.0;
         let half_ramp = if half_ramp > 0.0 { half_ramp } else { f64::INFINITY };
@@ -316,32 +350,44 @@ fn rest_lengths(problem: &Problem, sweep: &Sweep, ramp_s: f64) -> ([f64; 2], [f6
     ([ends[0].0, ends[1].0], [ends[0].1, ends[1].1])
 }
 
-/// Time from each station to the nearest place where the motion is not plain steady travel on a straight line [s].
-fn idle_time(clock: &[f64], speed: &[f64], u: &[f64], problem: &Problem, sweep: &Sweep) -> Vec<f64> {
+/// Stations where the motion is not plain steady travel on a straight line.
+fn eventful(speed: &[f64], problem: &Problem, sweep: &Sweep) -> Vec<bool> {
     const STEADY: f64 = 0.02;
-    let path = problem.path;
-    let n = u.len();
-    let per_span = (n - 1) / path.spans();
-    let mut pieces = Pieces::new(path);
-    let mut idle: Vec<f64> = (0..n)
-        .map(|k| {
-            let g = (k / per_span).min(path.spans() - 1);
-            let x = u[k] - path.breaks[g] as f64 * path.step;
-            let q = speed[k] * speed[k];
-            let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
-            let w = 0.5 * (sweep.q[b] - sweep.q[a]).abs() / (u[b] - u[a]);
-            let steady = pieces.at(g).iter().zip(problem.limits).all(|(p, l)| {
-                let bend = p.second(x).abs().max(p.second(0.0).abs()) * q;
-                bend <= STEADY * l.acceleration && p.first(x).abs() * w <= STEADY * l.acceleration
-            });
-            if steady && k > 0 && k + 1 < n { f64::INFINITY } else { 0.0 }
-        })
-        .collect();
-    for k in 1..n {
-        idle[k] = idle[k].min(idle[k - 1] + clock[k] - clock[k - 1]);
-    }
-    for k in (0..n - 1).rev() {
-        idle[k] = idle[k].min(idle[k + 1] + clock[k + 1] - clock[k]);
-    }
-    idle
+    let n = speed.len();
+    let mut k = 0;
+    let steady = each_station(problem, sweep, |axes, x| {
+        let q = speed[k] * speed[k];
+        let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+        k += 1;
+        let w = 0.5 * (sweep.q[b] - sweep.q[a]).abs() / (sweep.stations[b] - sweep.stations[a]);
+        let uses = axes.iter().zip(problem.limits).map(|(p, l)| {
+            let bend = p.second(x).abs().max(p.second(0.0).abs()) * q;
+            bend.max(p.first(x).abs() * w) / l.acceleration
+        });
+        uses.fold(0.0, f64::max)
+    });
+    steady.iter().enumerate().map(|(k, &uses)| uses > STEADY || k == 0 || k + 1 == n).collect()
+}
+
+/// Longest span at each station [s]: as long as `wanted` for a few spans round each station, growing with the time
+/// from there.
+fn spread(wanted: &[f64], clock: &[f64], spans_per_ramp: f64) -> Vec<f64> {
+    /// Ramps that keep their spans on either side, and growth of the spans beyond.
+    const FLAT_RAMPS: f64 = 1.5;
+    const GROWTH: f64 = 0.4;
+    let mut out = wanted.to_vec();
+    let mut pass = |order: &mut dyn Iterator<Item = usize>| {
+        let (mut from, mut least) = (0.0, f64::INFINITY);
+        for k in order {
+            let away = (clock[k] - from).abs() - FLAT_RAMPS * spans_per_ramp * least;
+            let carried = if least < f64::INFINITY { least + GROWTH * away.max(0.0) } else { least };
+            if wanted[k] <= carried {
+                (from, least) = (clock[k], wanted[k]);
+            }
+            out[k] = out[k].min(carried);
+        }
+    };
+    pass(&mut (0..wanted.len()));
+    pass(&mut (0..wanted.len()).rev());
+    out
 }

@@ -8,8 +8,10 @@ mod check;
 mod clarabel;
 mod error;
 pub mod horizon;
+mod insert;
 mod ipm;
 mod knots;
+mod lanes;
 mod layout;
 pub mod problem;
 mod rest;
@@ -25,14 +27,19 @@ mod zhao;
 
 pub use error::{LimitKind, PathFault, PlanError};
 
+use crate::feed::table::FeedTable;
 use crate::job::machine::AxisLimits;
 use layout::{Derivatives, Layout, Pieces, strictest};
 use problem::{Plan, Problem, Settings, Solver, Windows};
 use rows::RowSource;
 use sweep::Sweep;
 
-/// Rounds of dividing spans that the format does not allow.
-const MOST_REFINEMENTS: usize = 12;
+/// Solutions on ever finer knots.
+const MOST_SOLUTIONS: usize = 6;
+/// Rounds of dividing the spans of one solution.
+const MOST_DIVISIONS: usize = 48;
+/// Shares of q that are tried when the rounding on divided spans takes a little more than what was set aside for it.
+const SLOWER: [f64; 3] = [1.0, 0.9999, 0.999];
 /// Rounds of making the codes finer at the expense of top speed.
 const MOST_RESCALES: usize = 6;
 /// Headroom of the codes above the swept q.
@@ -65,29 +72,20 @@ fn plan_whole_up_to(whole: usize, problem: &Problem, settings: &Settings) -> Res
     let mut iterations = 0;
     // Spans that had to be divided are short: finer codes keep rounding from slowing them.
     let mut largest_code = rounding::SHORT_CODE;
-    for _ in 0..MOST_REFINEMENTS {
-        let plan = attempt.solve(&layout, largest_code, &mut iterations)?;
-        let Some(parts) = check::format(&layout, &plan.table) else {
-            return Ok(Plan { iterations, ..plan });
-        };
-        layout = match knots::refine(problem.path, &layout, &parts) {
-            Ok(refined) => refined,
-            Err(span) => {
-                let fault = format_error(problem, &layout, &plan, span);
-                return attempt.gentle(&placed, &mut iterations).ok_or(fault);
+    let mut fault = None;
+    for _ in 0..MOST_SOLUTIONS {
+        layout = match attempt.solve(&layout, largest_code, &mut iterations)? {
+            Solved::Plan(plan) => return Ok(Plan { iterations, ..plan }),
+            Solved::Divided(finer) => finer,
+            Solved::Indivisible(e) => {
+                fault = Some(e);
+                break;
             }
         };
         largest_code = rounding::LONG_CODE;
     }
-    let plan = attempt.solve(&layout, largest_code, &mut iterations)?;
-    match check::format(&layout, &plan.table) {
-        None => Ok(Plan { iterations, ..plan }),
-        Some(parts) => {
-            let span = parts.iter().position(|&p| p > 1).unwrap_or(0);
-            let fault = format_error(problem, &layout, &plan, span);
-            attempt.gentle(&placed, &mut iterations).ok_or(fault)
-        }
-    }
+    let uneven = PlanError::Uneven { span: 0, u: 0.0 };
+    attempt.gentle(&placed, &mut iterations).ok_or(fault.unwrap_or(uneven))
 }
 
 /// The limits, lowered where they would let speed or acceleration change within so few ticks that no span could
@@ -122,12 +120,6 @@ fn slowed(problem: &Problem) -> Vec<AxisLimits> {
         .collect()
 }
 
-fn format_error(problem: &Problem, layout: &Layout, plan: &Plan, span: usize) -> PlanError {
-    let u = layout.start(problem.path, span);
-    let seconds = plan.table.law(span).duration();
-    if seconds >= 1.0 { PlanError::Slow { span, u, seconds } } else { PlanError::Uneven { span, u } }
-}
-
 fn validate_settings(settings: &Settings) -> Result<(), PlanError> {
     let sound = |v: f64| v > 0.0 && v.is_finite();
     if !sound(settings.relative_gap) {
@@ -137,6 +129,16 @@ fn validate_settings(settings: &Settings) -> Result<(), PlanError> {
         return Err(PlanError::Setting { name: "spans_per_ramp", value: settings.spans_per_ramp });
     }
     Ok(())
+}
+
+/// What became of a solution.
+enum Solved {
+    /// It is a plan.
+    Plan(Plan),
+    /// It has to be found anew on finer knots.
+    Divided(Layout),
+    /// Its spans must be divided further than the grid allows.
+    Indivisible(PlanError),
 }
 
 /// What one solution after another is found from.
@@ -149,7 +151,7 @@ struct Attempt<'a> {
 
 impl Attempt<'_> {
     /// Solves on given knots, rounds and checks.
-    fn solve(&self, layout: &Layout, largest_code: f64, iterations: &mut u64) -> Result<Plan, PlanError> {
+    fn solve(&self, layout: &Layout, largest_code: f64, iterations: &mut u64) -> Result<Solved, PlanError> {
         let problem = self.problem;
         let unit = self.sweep.top();
         let mut refined = layout.clone();
@@ -158,21 +160,22 @@ impl Attempt<'_> {
         }
         let layout = &refined;
         let joints = joints(problem, layout);
-        let mut source =
-            RowSource { problem: *problem, layout, unit, ceiling: CEILING, joint: joints, largest_code };
+        let swept = self.swept(layout);
+        let mut source = self.source(layout, &swept, joints, largest_code);
         let mut worst = 1;
         for _ in 0..MOST_RESCALES {
             source.joint = joints.map(|q| (q / unit).min(source.ceiling));
             let scale = rounding::scale(&source);
             let half = rounding::halves(&source, scale, self.sweep);
-            if let Some(x) = self.optimise(&source, &half, iterations) {
+            if let Some((x, gap_s)) = self.optimise(&source, &half, iterations) {
                 let table = rounding::table(&source, scale, &x);
-                let rounded = rounding::values(&source, &table);
-                let findings = check::rows(&source, &rounded, &half);
-                if findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC {
-                    return Ok(Plan { table, binding: findings.binding, iterations: 0 });
+                if let Some(parts) = check::format(layout, &table) {
+                    return Ok(self.divided(&source, x, gap_s, parts));
                 }
-                worst = findings.span;
+                match self.checked(&source, &half, table) {
+                    Ok(plan) => return Ok(Solved::Plan(Plan { gap_s, ..plan })),
+                    Err(span) => worst = span,
+                }
             }
             // Rounding alone breaks a limit: the codes are too coarse for the slowest places.
             if source.largest_code < rounding::LONG_CODE {
@@ -184,6 +187,63 @@ impl Attempt<'_> {
         Err(PlanError::Resolution { span: worst, u: layout.start(problem.path, worst) })
     }
 
+    /// The plan of a rounded table that keeps every row, or the span that breaks one.
+    fn checked(&self, source: &RowSource, half: &[f64], table: FeedTable) -> Result<Plan, usize> {
+        let findings = check::rows(source, &rounding::values(source, &table), half);
+        if findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC {
+            Ok(Plan { table, binding: findings.binding, iterations: 0, gap_s: f64::INFINITY })
+        } else {
+            Err(findings.span)
+        }
+    }
+
+    /// The same motion on knots as fine as the format asks for, in the finest codes.
+    fn divided(&self, source: &RowSource, mut x: Vec<f64>, gap_s: f64, mut parts: Vec<u32>) -> Solved {
+        let path = self.problem.path;
+        let last = parts.len() - 1;
+        let fault = |layout: &Layout, span: usize, table: &FeedTable| {
+            let (u, seconds) = (layout.start(path, span), table.law(span).duration());
+            Solved::Indivisible(match seconds >= 1.0 {
+                true => PlanError::Slow { span, u, seconds },
+                false => PlanError::Uneven { span, u },
+            })
+        };
+        let mut layout = source.layout.clone();
+        let source = RowSource { largest_code: rounding::LONG_CODE, ..source.clone() };
+        if parts[0] > 1 || parts[last] > 1 {
+            // A rest span has no parts: the motion next to it becomes another.
+            return match knots::refine(path, &layout, &parts) {
+                Ok(finer) => Solved::Divided(finer),
+                Err(span) => fault(&layout, span, &rounding::table(&source, rounding::scale(&source), &x)),
+            };
+        }
+        for _ in 0..MOST_DIVISIONS {
+            let coarse = RowSource { layout: &layout, ..source.clone() };
+            (layout, x) = match insert::insert(&coarse, &x, &parts) {
+                Ok(finer) => finer,
+                Err(span) => {
+                    return fault(&layout, span, &rounding::table(&coarse, rounding::scale(&coarse), &x));
+                }
+            };
+            let swept = self.swept(&layout);
+            let fine = RowSource { layout: &layout, swept: &swept, ..source.clone() };
+            let scale = rounding::scale(&fine);
+            if let Some(more) = check::format(&layout, &rounding::table(&fine, scale, &x)) {
+                parts = more;
+                continue;
+            }
+            let half = rounding::halves(&fine, scale, self.sweep);
+            let slower = SLOWER.iter().find_map(|share| {
+                let slower: Vec<f64> = x.iter().map(|x| x * share).collect();
+                let table = rounding::table(&fine, scale, &slower);
+                let sound = check::format(&layout, &table).is_none();
+                self.checked(&fine, &half, table).ok().filter(|_| sound)
+            });
+            return slower.map_or(Solved::Divided(layout), |plan| Solved::Plan(Plan { gap_s, ..plan }));
+        }
+        Solved::Divided(layout)
+    }
+
     /// A plan between the smooth start and the fastest motion, as near the latter as limits and format allow: for
     /// paths on which the fastest motion changes its speed more sharply than spans can follow.
     fn gentle(&self, layout: &Layout, iterations: &mut u64) -> Option<Plan> {
@@ -191,15 +251,15 @@ impl Attempt<'_> {
         const SCALINGS: usize = 40;
         let unit = self.sweep.top();
         let joint = joints(self.problem, layout).map(|q| (q / unit).min(CEILING));
-        let (problem, largest_code) = (*self.problem, rounding::LONG_CODE);
-        let source = RowSource { problem, layout, unit, ceiling: CEILING, joint, largest_code };
+        let swept = self.swept(layout);
+        let source = self.source(layout, &swept, joint, rounding::LONG_CODE);
         let scale = rounding::scale(&source);
         let half = rounding::halves(&source, scale, self.sweep);
         let sound = |x: &[f64]| {
             let table = rounding::table(&source, scale, x);
             let findings = check::rows(&source, &rounding::values(&source, &table), &half);
             let keeps = findings.worst <= 1.0 + crate::tolerances::ROW_ARITHMETIC;
-            let plan = Plan { table, binding: findings.binding, iterations: 0 };
+            let plan = Plan { table, binding: findings.binding, iterations: 0, gap_s: f64::INFINITY };
             (keeps && check::format(layout, &plan.table).is_none()).then_some(plan)
         };
         let mut slow = start::profile(&source);
@@ -210,7 +270,7 @@ impl Attempt<'_> {
             }
             plan
         })?;
-        let fast = self.optimise(&source, &half, iterations).unwrap_or_else(|| slow.clone());
+        let fast = self.optimise(&source, &half, iterations).map_or_else(|| slow.clone(), |(x, _)| x);
         let between = |share: f64| -> Vec<f64> {
             slow.iter().zip(&fast).map(|(slow, fast)| slow + share * (fast - slow)).collect()
         };
@@ -218,37 +278,65 @@ impl Attempt<'_> {
         Some(Plan { iterations: *iterations, ..plan })
     }
 
-    /// Largest swept q on each span.
+    /// What rows are made from on given knots.
+    fn source<'s>(
+        &'s self,
+        layout: &'s Layout,
+        swept: &'s [f64],
+        joint: [f64; 2],
+        largest_code: f64,
+    ) -> RowSource<'s> {
+        let Settings { jerk, rows: form, .. } = *self.settings;
+        let (problem, unit) = (*self.problem, self.sweep.top());
+        RowSource {
+            problem,
+            layout,
+            unit,
+            ceiling: CEILING,
+            joint,
+            largest_code,
+            swept,
+            jerk,
+            form,
+            bends: true,
+        }
+    }
+
+    /// Largest swept x on each inner span.
     fn swept(&self, layout: &Layout) -> Vec<f64> {
-        let path = self.problem.path;
+        let (path, unit) = (self.problem.path, self.sweep.top());
         let mut hint = 0;
-        (0..layout.spans())
-            .map(|i| self.sweep.largest(layout.start(path, i), layout.start(path, i + 1), &mut hint))
+        (1..layout.spans() - 1)
+            .map(|i| {
+                let (from, to) = (layout.start(path, i), layout.start(path, i + 1));
+                self.sweep.largest(from, to, &mut hint) / unit
+            })
             .collect()
     }
 
-    /// Control values of minimum time; `None` where rounding alone would break a limit at any speed.
-    fn optimise(&self, source: &RowSource, half: &[f64], iterations: &mut u64) -> Option<Vec<f64>> {
-        let mut x = start::profile(source);
+    /// Control values of minimum time, and how far above the optimum they may be [s]; `None` where rounding alone
+    /// would break a limit at any speed.
+    fn optimise(&self, source: &RowSource, half: &[f64], iterations: &mut u64) -> Option<(Vec<f64>, f64)> {
         let gap = self.settings.relative_gap;
-        match self.settings.solver {
-            Solver::InteriorPoint => {
-                *iterations += match self.settings.windows {
-                    Windows::Whole => window::solve(source, &mut x, half, gap, usize::MAX)?,
-                    Windows::Overlap => window::solve(source, &mut x, half, gap, self.whole)?,
-                    Windows::Zhao => zhao::solve(source, &mut x, half, gap)?,
+        start::candidates(source).into_iter().find_map(|start::Start { mut x, bends }| {
+            let source = &RowSource { bends, ..source.clone() };
+            let (x, gap, count) = match self.settings.solver {
+                Solver::InteriorPoint => {
+                    let total = match self.settings.windows {
+                        Windows::Whole => window::solve(source, &mut x, half, gap, usize::MAX)?,
+                        Windows::Overlap => window::solve(source, &mut x, half, gap, self.whole)?,
+                        Windows::Zhao => zhao::solve(source, &mut x, half, gap)?,
+                    };
+                    (x, total.gap, total.iterations)
                 }
-            }
-            Solver::Clarabel => {
-                let mut swept = self.swept(source.layout);
-                swept.iter_mut().for_each(|q| *q /= source.unit);
-                let inner = &swept[1..swept.len() - 1];
-                let (answer, count) = clarabel::solve(source, inner, &x, half, gap)?;
-                *iterations += count;
-                x = answer;
-            }
-        }
-        Some(x)
+                Solver::Clarabel => {
+                    let answer = clarabel::solve(source, &x, half, gap)?;
+                    (answer.x, answer.gap, answer.iterations)
+                }
+            };
+            *iterations += count;
+            Some((x, gap / source.unit.sqrt()))
+        })
     }
 }
 

@@ -97,6 +97,9 @@ pub struct Plan {
     pub binding: Vec<Binding>,
     /// Iterations of the solver, all windows together.
     pub iterations: u64,
+    /// What the solver left: how far the time can at most be above the optimum on these knots under the last tangents
+    /// [s]. Infinite where the plan is none of the solver's.
+    pub gap_s: f64,
 }
 
 /// The limit that rules a span.

@@ -8,39 +8,104 @@
 //! - jerk: |f| <= J/sqrt(q) with f = p''' q + 3/2 p'' q' + 1/2 p' q'', degree 2 [Zhao2016 eq. 3.2]. 1/sqrt(x) lies
 //!   above its tangent at 1/s^2, so for any s > 0: +-F/(1.5 s) + (s^2/3) x <= 1, F = V^3 f/J.
 
-use super::layout::{Derivatives, Layout, Pieces, Strictest, strictest};
-use super::problem::Problem;
+mod builder;
+
+pub(super) use builder::RowBuilder;
+
+use super::lanes::{LANES, Lanes};
+use super::layout::{Layout, Pieces, Strictest, strictest};
+use super::problem::{JerkForm, Problem, RowForm};
 use super::rounding;
+use crate::geometry::grid_path::Piece;
 use crate::job::machine::MAX_AXES;
 
 /// Spans that a drive may have to cross within a control tick. The format allows a few more; placed knots lie at
 /// least a tick apart, only divided spans are shorter.
 pub(super) const SPANS_PER_TICK: f64 = 12.0;
 
+/// Lane groups that hold all axes.
+pub(super) const GROUPS: usize = MAX_AXES.div_ceil(LANES);
+/// One number per axis that moves.
+pub(super) type Wide = [Lanes; GROUPS];
+
 /// What a row stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
     /// Velocity of an axis.
     Velocity(u8),
+    /// Acceleration of an axis.
+    Acceleration(u8),
+    /// Jerk of an axis.
+    Jerk(u8),
     /// A cap on the path speed.
     Feed,
     /// What the joint with a rest span allows.
     Rest,
-    /// What the largest code can carry, and the shortest span time.
+    /// What the largest code can carry, the shortest span time, and limits that are far from ruling.
     Format,
+    /// How sharply q may bend within a span.
+    Bend,
+}
+
+/// A row a.c <= bound.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    /// On the three control values round the span.
+    pub(super) a: [f64; 3],
+    /// 1, or 0 for a relation between the control values.
+    pub(super) bound: f64,
+    /// What it stands for.
+    pub(super) source: Source,
 }
 
 /// The rows of one cell, divided by their bounds; each triple multiplies the three control values round the span.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CellRows {
-    /// a.c <= 1.
-    pub(super) upper: Vec<([f64; 3], Source)>,
-    /// |a.c| <= 1: acceleration, with its axis.
-    pub(super) acceleration: Vec<([f64; 3], u8)>,
-    /// F of the jerk rows, with its axis; Bernstein coefficients 0, 1, 2 in turn.
-    pub(super) jerk: Vec<([f64; 3], u8)>,
+    /// a.c <= bound.
+    pub(super) upper: Vec<Row>,
+    /// |a.c| <= 1, axes side by side: acceleration, Bernstein coefficients in turn, and then pseudo-jerk.
+    pub(super) bends: Vec<[Wide; 3]>,
+    /// F of the jerk rows, axes side by side, Bernstein coefficients in turn.
+    pub(super) jerks: Vec<[Wide; 3]>,
+    /// How many of `bends` are acceleration.
+    accelerations: usize,
+    /// The axes that move, in the order of the lanes.
+    axes: [u8; MAX_AXES],
+    moving: usize,
     /// Bernstein coefficients of x over the cell.
     pub(super) x: [[f64; 3]; 3],
+}
+
+impl CellRows {
+    /// Lane groups in use.
+    pub(super) fn groups(&self) -> usize {
+        self.moving.div_ceil(LANES)
+    }
+
+    fn of_axes<'a>(&'a self, wide: &'a [[Lanes; GROUPS]; 3]) -> impl Iterator<Item = ([f64; 3], u8)> + 'a {
+        self.axes[..self.moving]
+            .iter()
+            .enumerate()
+            .map(|(lane, &axis)| (wide.map(|w| w[lane / LANES].0[lane % LANES]), axis))
+    }
+
+    /// Rows |a.c| <= 1 one by one.
+    pub(super) fn pairs(&self) -> impl Iterator<Item = ([f64; 3], Source)> + '_ {
+        self.bends.iter().enumerate().flat_map(move |(k, wide)| {
+            let acceleration = k < self.accelerations;
+            self.of_axes(wide).map(move |(a, axis)| {
+                (a, if acceleration { Source::Acceleration(axis) } else { Source::Jerk(axis) })
+            })
+        })
+    }
+
+    /// The F of the jerk rows one by one, with the Bernstein coefficient they belong to, and their axis.
+    pub(super) fn forces(&self) -> impl Iterator<Item = ([f64; 3], usize, u8)> + '_ {
+        self.jerks
+            .iter()
+            .enumerate()
+            .flat_map(move |(k, wide)| self.of_axes(wide).map(move |(a, axis)| (a, k, axis)))
+    }
 }
 
 /// What the rows are made from.
@@ -58,6 +123,14 @@ pub(super) struct RowSource<'a> {
     pub(super) joint: [f64; 2],
     /// The largest code.
     pub(super) largest_code: f64,
+    /// Largest swept x round each inner span.
+    pub(super) swept: &'a [f64],
+    /// How jerk is written.
+    pub(super) jerk: JerkForm,
+    /// Where rows hold.
+    pub(super) form: RowForm,
+    /// Whether there are rows against bending too sharply.
+    pub(super) bends: bool,
 }
 
 impl RowSource<'_> {
@@ -93,159 +166,39 @@ impl RowSource<'_> {
         strictest(self.problem.caps, self.layout.knots[s + 1], self.layout.knots[s + 2])
     }
 
-    /// Fills `out` with the rows of cell `cell` of inner span `s`.
-    pub(super) fn cell(&self, s: usize, cell: usize, pieces: &mut Pieces, out: &mut CellRows) {
-        out.upper.clear();
-        out.acceleration.clear();
-        out.jerk.clear();
-        let layout = self.layout;
-        let i = s + 1;
-        let cells = f64::from(layout.cells[i]);
-        let (t0, t1) = (cell as f64 / cells, (cell + 1) as f64 / cells);
-        let g = layout.geometry[i] as usize;
-        let path = self.problem.path;
-        let offset = (layout.knots[i] - path.breaks[g]) as f64 * path.step;
-        let length = layout.h[i] / cells;
-        out.x = sub_cell(&self.bezier(s), t0, t1);
-        let axes = pieces.at(g);
-        let mut d = [Derivatives::default(); MAX_AXES];
-        for (axis, (d, piece)) in d.iter_mut().zip(axes).enumerate() {
-            *d = Derivatives::of(piece, offset + t0 * layout.h[i], length);
-            if !d.still() {
-                self.axis(axis, d, length, out);
-            }
-        }
-        self.speed_caps(s, &d[..axes.len()], out);
-        if cell == 0 {
-            out.upper.push(([0.0, 1.0 / self.ceiling, 0.0], Source::Format));
-            self.joints(s, out);
-        }
-    }
-
-    fn axis(&self, axis: usize, d: &Derivatives, h: f64, out: &mut CellRows) {
-        let limits = &self.problem.limits[axis];
-        let id = axis as u8;
-        let x = out.x;
-        let e = d.first_squared().map(|e| e * self.unit / (limits.velocity * limits.velocity));
-        degree_six(&e, &x, |row| out.upper.push((row, Source::Velocity(id))));
-        // q'/2 has the Bernstein coefficients (b1 - b0)/h, (b2 - b1)/h.
-        let slope = [scaled_difference(&x[1], &x[0], h), scaled_difference(&x[2], &x[1], h)];
-        let bend = scaled_difference(&slope[1], &slope[0], h);
-        let [s0, s1] = d.second;
-        let [p0, p1, p2] = d.first;
-        let k = self.unit / limits.acceleration;
-        let mut acceleration = |terms: [f64; 5]| {
-            let [a, b, c, u, v] = terms.map(|t| t * k);
-            let row = |j| a * x[0][j] + b * x[1][j] + c * x[2][j] + u * slope[0][j] + v * slope[1][j];
-            out.acceleration.push(([row(0), row(1), row(2)], id));
-        };
-        let third = 1.0 / 3.0;
-        acceleration([s0, 0.0, 0.0, p0, 0.0]);
-        acceleration([s1 * third, 2.0 * s0 * third, 0.0, 2.0 * p1 * third, p0 * third]);
-        acceleration([0.0, 2.0 * s1 * third, s0 * third, p2 * third, 2.0 * p1 * third]);
-        acceleration([0.0, 0.0, s1, 0.0, p2]);
-        if limits.jerk.is_finite() {
-            let k = self.unit * self.unit.sqrt() / limits.jerk;
-            let mixed = [[s0, 0.0], [0.5 * s1, 0.5 * s0], [0.0, s1]];
-            for (i, m) in mixed.iter().enumerate() {
-                let row = |j: usize| {
-                    k * (d.third * x[i][j]
-                        + 3.0 * (m[0] * slope[0][j] + m[1] * slope[1][j])
-                        + d.first[i] * bend[j])
-                };
-                out.jerk.push(([row(0), row(1), row(2)], id));
-            }
-        }
-    }
-
-    fn speed_caps(&self, s: usize, axes: &[Derivatives], out: &mut CellRows) {
-        let caps = self.caps(s);
-        let x = out.x;
-        for (mask, speed) in caps.tangential.iter().flatten() {
-            let mut e = [0.0; 5];
-            for (_, d) in axes.iter().enumerate().filter(|(axis, _)| mask >> axis & 1 == 1) {
-                e.iter_mut().zip(d.first_squared()).for_each(|(e, p)| *e += p * self.unit / (speed * speed));
-            }
-            if e.iter().any(|e| *e != 0.0) {
-                degree_six(&e, &x, |row| out.upper.push((row, Source::Feed)));
-            }
-        }
-        if caps.rate.is_finite() {
-            let k = self.unit / (caps.rate * caps.rate);
-            out.upper.extend(x.iter().map(|b| (b.map(|v| v * k), Source::Feed)));
-        }
-        // q <= (h/T)^2 all over the span keeps it as long as T; needed only where x = ceiling is too fast.
-        let bound = self.longest_enough(s, axes);
-        if bound < self.ceiling {
-            out.upper.extend(x.iter().map(|b| (b.map(|v| v / bound), Source::Format)));
-        }
-    }
-
     /// Largest x on inner span `s` at which the span is as long as it must be: a share of the control tick, and what
     /// rounding needs.
-    fn longest_enough(&self, s: usize, axes: &[Derivatives]) -> f64 {
+    fn longest_enough(&self, s: usize, slopes: impl Iterator<Item = f64>) -> f64 {
         const ROUNDING_SHARE: f64 = 0.2;
         let step = (self.unit * self.ceiling).sqrt() / self.largest_code;
         let tick = self.problem.control_tick_s / SPANS_PER_TICK;
-        let shortest = axes
-            .iter()
+        let shortest = slopes
             .zip(self.problem.limits)
-            .fold(tick, |t, (d, l)| rounding::shortest_s(d.first_max(), l, step, ROUNDING_SHARE).max(t));
+            .filter(|(slope, _)| *slope > 0.0)
+            .fold(tick, |t, (slope, l)| rounding::shortest_s(slope, l, step, ROUNDING_SHARE).max(t));
         (self.layout.h[s + 1] / shortest).powi(2) / self.unit
     }
 
-    /// The same over the whole span.
+    /// The same, found from the path.
     pub(super) fn shortest_bound(&self, s: usize, pieces: &mut Pieces) -> f64 {
         let layout = self.layout;
         let g = layout.geometry[s + 1] as usize;
         let path = self.problem.path;
         let offset = (layout.knots[s + 1] - path.breaks[g]) as f64 * path.step;
-        let mut d = [Derivatives::default(); MAX_AXES];
-        let axes = pieces.at(g);
-        d.iter_mut().zip(axes).for_each(|(d, p)| *d = Derivatives::of(p, offset, layout.h[s + 1]));
-        self.longest_enough(s, &d[..axes.len()])
-    }
-
-    fn joints(&self, s: usize, out: &mut CellRows) {
-        let fold = self.fold();
-        if s == 0 {
-            out.upper.push(([0.0, 1.0 / (fold[0] * self.joint[0]), 0.0], Source::Rest));
-        }
-        if s + 1 == self.layout.unknowns() {
-            out.upper.push(([0.0, 1.0 / (fold[1] * self.joint[1]), 0.0], Source::Rest));
-        }
+        let h = layout.h[s + 1];
+        let slopes = pieces.at(g).iter().map(|p| steepest(p, offset, h));
+        self.longest_enough(s, slopes)
     }
 }
 
-/// Bernstein coefficients over the part [t0, t1] of a quadratic, by blossoming.
-fn sub_cell(b: &[[f64; 3]; 3], t0: f64, t1: f64) -> [[f64; 3]; 3] {
-    if t0 == 0.0 && t1 == 1.0 {
-        return *b;
-    }
-    let blossom = |s: f64, t: f64| {
-        let w = [(1.0 - s) * (1.0 - t), s * (1.0 - t) + t * (1.0 - s), s * t];
-        [0, 1, 2].map(|j| w[0] * b[0][j] + w[1] * b[1][j] + w[2] * b[2][j])
-    };
-    [blossom(t0, t0), blossom(t0, t1), blossom(t1, t1)]
-}
-
-fn scaled_difference(a: &[f64; 3], b: &[f64; 3], h: f64) -> [f64; 3] {
-    [0, 1, 2].map(|j| (a[j] - b[j]) / h)
-}
-
-/// Product of a quartic `e` with the quadratic `x`: seven rows.
-fn degree_six(e: &[f64; 5], x: &[[f64; 3]; 3], mut emit: impl FnMut([f64; 3])) {
-    let mut row = |w: [f64; 3]| emit([0, 1, 2].map(|j| w[0] * x[0][j] + w[1] * x[1][j] + w[2] * x[2][j]));
-    row([e[0], 0.0, 0.0]);
-    row([4.0 * e[1] / 6.0, 2.0 * e[0] / 6.0, 0.0]);
-    row([6.0 * e[2] / 15.0, 8.0 * e[1] / 15.0, e[0] / 15.0]);
-    row([4.0 * e[3] / 20.0, 12.0 * e[2] / 20.0, 4.0 * e[1] / 20.0]);
-    row([e[4] / 15.0, 8.0 * e[3] / 15.0, 6.0 * e[2] / 15.0]);
-    row([0.0, 2.0 * e[4] / 6.0, 4.0 * e[3] / 6.0]);
-    row([0.0, 0.0, e[4]]);
+/// Largest Bernstein coefficient of |p'| over [x, x + h].
+fn steepest(piece: &Piece, x: f64, h: f64) -> f64 {
+    let (a, c) = (piece.first(x), piece.first(x + h));
+    a.abs().max((a + 0.5 * h * piece.second(x)).abs()).max(c.abs())
 }
 
 /// Dot product of a row with three control values.
+#[inline(always)]
 pub(super) fn dot(a: &[f64; 3], c: &[f64; 3]) -> f64 {
     a[0] * c[0] + a[1] * c[1] + a[2] * c[2]
 }

@@ -4,7 +4,7 @@
 //! conditions alone: between rests a feasible start always exists.
 
 use super::layout::{Derivatives, Pieces};
-use super::rows::RowSource;
+use super::rows::{RowSource, dot};
 use crate::job::machine::MAX_AXES;
 
 /// Share of the acceleration limit the start's slope may use.
@@ -15,34 +15,130 @@ const JERK_SHARE: f64 = 0.6;
 const JOINT_SHARE: f64 = 0.25;
 /// Scale of the first attempt.
 const SCALE: f64 = 0.7;
+/// Most that neighbouring control values differ where the profile had to be made gentler.
+const GENTLE: f64 = 1.25;
+/// Share of the bend a span may have that the start uses.
+const BEND_SHARE: f64 = 0.9;
 
-/// Control values of x, one per inner span; feasible as they are or after scaling down.
+/// Where to start from.
+#[derive(Clone, Debug)]
+pub(super) struct Start {
+    /// Control values of x, one per inner span; feasible as they are or after scaling down.
+    pub(super) x: Vec<f64>,
+    /// Whether no span bends more than the table's format allows. On knots forced to lie very unevenly, or where codes
+    /// are coarse for slow places, no such start may be found.
+    pub(super) bends: bool,
+}
+
+/// The profile that bends as it likes.
 pub(super) fn profile(rows: &RowSource) -> Vec<f64> {
-    let layout = rows.layout;
-    let m = layout.unknowns();
-    let h = &layout.h;
-    let mut pieces = Pieces::new(rows.problem.path);
-    let (mut x, slope): (Vec<f64>, Vec<f64>) = (0..m).map(|s| constant(rows, s, &mut pieces)).unzip();
-    let middles = middles(h);
-    erode(&mut x, &middles, smoothing_width(rows));
-    for s in 1..m {
-        let rise = slope[s].min(slope[s - 1]) * (middles[s] - middles[s - 1]);
-        x[s] = x[s].min(x[s - 1] + rise);
+    Profile::new(rows).plain()
+}
+
+/// Profiles to start from, the best first; the next one is for when no scale makes one feasible.
+pub(super) fn candidates(rows: &RowSource) -> Vec<Start> {
+    let profile = Profile::new(rows);
+    let plain = profile.plain();
+    if bends(rows, &plain) {
+        return vec![Start { x: plain, bends: true }];
     }
-    for s in (1..m).rev() {
-        let rise = slope[s].min(slope[s - 1]) * (middles[s] - middles[s - 1]);
-        x[s - 1] = x[s - 1].min(x[s] + rise);
+    let mut all = Vec::new();
+    let gentle = profile.gentle();
+    if bends(rows, &gentle) {
+        all.push(Start { x: gentle, bends: true });
+    } else if let Some(x) = profile.mixed(&plain, |x| bends(rows, x)) {
+        all.push(Start { x, bends: true });
     }
-    for _ in 0..2 {
-        smooth(&mut x, h, &middles, 0.5 * smoothing_width(rows));
+    all.push(Start { x: plain, bends: false });
+    all
+}
+
+/// What profiles are made of.
+struct Profile {
+    /// Limited in value and slope.
+    bounded: Vec<f64>,
+    /// The same, smoothed.
+    smooth: Vec<f64>,
+    /// Between two rests and nothing else.
+    free: Vec<f64>,
+}
+
+impl Profile {
+    fn new(rows: &RowSource) -> Self {
+        let layout = rows.layout;
+        let m = layout.unknowns();
+        let h = &layout.h;
+        let mut pieces = Pieces::new(rows.problem.path);
+        let (mut x, slope): (Vec<f64>, Vec<f64>) = (0..m).map(|s| constant(rows, s, &mut pieces)).unzip();
+        let middles = middles(h);
+        erode(&mut x, &middles, smoothing_width(rows));
+        for s in 1..m {
+            let rise = slope[s].min(slope[s - 1]) * (middles[s] - middles[s - 1]);
+            x[s] = x[s].min(x[s - 1] + rise);
+        }
+        for s in (1..m).rev() {
+            let rise = slope[s].min(slope[s - 1]) * (middles[s] - middles[s - 1]);
+            x[s - 1] = x[s - 1].min(x[s] + rise);
+        }
+        let bounded = x.clone();
+        for _ in 0..2 {
+            smooth(&mut x, h, &middles, 0.5 * smoothing_width(rows));
+        }
+        let length = middles[m - 1] + 0.5 * h[m] + h[m + 1];
+        let free: Vec<f64> = middles
+            .iter()
+            .map(|u| {
+                let launch = JOINT_SHARE * rows.joint[0] * (u / h[0]).powf(4.0 / 3.0);
+                let landing = JOINT_SHARE * rows.joint[1] * ((length - u) / h[m + 1]).powf(4.0 / 3.0);
+                1.0 / (1.0 / launch + 1.0 / landing)
+            })
+            .collect();
+        Profile { bounded, smooth: x, free }
     }
-    let length = middles[m - 1] + 0.5 * h[m] + h[m + 1];
-    for (s, x) in x.iter_mut().enumerate() {
-        let launch = JOINT_SHARE * rows.joint[0] * (middles[s] / h[0]).powf(4.0 / 3.0);
-        let landing = JOINT_SHARE * rows.joint[1] * ((length - middles[s]) / h[m + 1]).powf(4.0 / 3.0);
-        *x = SCALE / (1.0 / *x + 1.0 / launch + 1.0 / landing);
+
+    /// The smoothed one, from rest to rest.
+    fn plain(&self) -> Vec<f64> {
+        self.between(&self.smooth)
     }
-    x
+
+    /// Neighbours differ by no more than a share of themselves, but for the rests.
+    fn gentle(&self) -> Vec<f64> {
+        let mut x = self.bounded.clone();
+        let m = x.len();
+        (1..m).for_each(|s| x[s] = x[s].min(GENTLE * x[s - 1]));
+        (1..m).rev().for_each(|s| x[s - 1] = x[s - 1].min(GENTLE * x[s]));
+        self.between(&x)
+    }
+
+    /// `plain` and as much free motion, which bends least, as `sound` asks for; as much of that as `plain` allows
+    /// everywhere.
+    fn mixed(&self, plain: &[f64], sound: impl Fn(&[f64]) -> bool) -> Option<Vec<f64>> {
+        const MOST_DOUBLINGS: i32 = 60;
+        let mut mixed = (0..MOST_DOUBLINGS)
+            .map(|k| {
+                let share = 1e-6 * 2f64.powi(k);
+                plain.iter().zip(&self.free).map(|(x, free)| x + share * free).collect::<Vec<f64>>()
+            })
+            .find(|x| sound(x))?;
+        let scale = plain.iter().zip(&mixed).map(|(x, mixed)| x / mixed).fold(1.0, f64::min);
+        mixed.iter_mut().for_each(|x| *x *= scale);
+        Some(mixed)
+    }
+
+    fn between(&self, x: &[f64]) -> Vec<f64> {
+        x.iter().zip(&self.free).map(|(x, free)| SCALE / (1.0 / x + 1.0 / free)).collect()
+    }
+}
+
+/// Whether no span bends more than the format allows; scaling does not change that.
+fn bends(rows: &RowSource, x: &[f64]) -> bool {
+    let m = x.len();
+    (0..m).all(|s| {
+        let get = |j: usize| if j == 0 || j > m { 0.0 } else { x[j - 1] };
+        let c = [get(s), get(s + 1), get(s + 2)];
+        let b = rows.bezier(s).map(|b| dot(&b, &c));
+        (b[0] - 2.0 * b[1] + b[2]).abs() <= 0.25 * BEND_SHARE * (b[0] + b[2])
+    })
 }
 
 /// Middles of the inner spans in u: where their control values sit.

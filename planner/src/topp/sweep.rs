@@ -3,10 +3,18 @@
 //! Backward, the largest q from which the rest of the path can be survived (the controllable set of [Pham2018]);
 //! forward, as fast as that allows. Limits hold at the stations. The bound between a lower limit of one axis and an
 //! upper limit of another (the maximum velocity curve) is part of both passes.
+//!
+//! [`Sweeper`] sweeps sampled derivatives ([`Samples`]), again and again in the same memory; [`Sweep`] is the sweep of
+//! a problem at stations of its own choice.
 
-use super::layout::{Derivatives, Pieces, strictest};
+mod passes;
+mod samples;
+
+pub use passes::Sweeper;
+pub use samples::{Samples, SamplesError};
+
+use super::layout::{Pieces, strictest};
 use super::problem::Problem;
-use crate::job::machine::MAX_AXES;
 
 /// q*(u) at stations along the path.
 #[derive(Clone, Debug)]
@@ -19,76 +27,24 @@ pub struct Sweep {
     pub constant: Vec<f64>,
 }
 
-/// One station's limits on path acceleration w at q: |slope q + gain w| <= bound per axis.
-#[derive(Clone, Copy, Debug, Default)]
-struct Strip {
-    gain: f64,
-    slope: f64,
-    bound: f64,
-}
-
 impl Sweep {
     /// Sweeps the path of a valid problem.
     pub fn new(problem: &Problem) -> Self {
-        let axes = problem.path.axes.len();
         let (stations, geometry) = stations(problem);
         let n = stations.len();
-        let mut strips = Vec::with_capacity(n * axes);
-        let mut constant = Vec::with_capacity(n);
-        let mut q = Vec::with_capacity(n);
-        let mut pieces = Pieces::new(problem.path);
-        for (&u, &g) in stations.iter().zip(&geometry) {
-            let x = u - problem.path.breaks[g] as f64 * problem.path.step;
-            let at = grid_steps(u, problem.path.step);
-            let caps = strictest(problem.caps, at.saturating_sub(1), at + 1);
-            let mut bound = caps.rate * caps.rate;
-            let mut d = [Derivatives::default(); MAX_AXES];
-            let mut jerk_bound = f64::INFINITY;
-            let from = strips.len();
-            for ((d, piece), l) in d.iter_mut().zip(pieces.at(g)).zip(problem.limits) {
-                *d = Derivatives::of(piece, x, 0.0);
-                bound = bound.min((l.velocity / d.first[0]).powi(2));
-                jerk_bound = jerk_bound.min((l.jerk / d.third.abs()).powf(2.0 / 3.0));
-                let gain = d.first[0].abs();
-                let slope = if d.first[0] < 0.0 { -d.second[0] } else { d.second[0] };
-                strips.push(Strip { gain, slope, bound: l.acceleration });
-            }
-            for (mask, speed) in caps.tangential.iter().flatten() {
-                let square: f64 =
-                    (0..axes).filter(|a| mask >> a & 1 == 1).map(|a| d[a].first[0].powi(2)).sum();
-                bound = bound.min(speed * speed / square);
-            }
-            bound = bound.min(curve_bound(&strips[from..]));
-            constant.push(bound.min(jerk_bound));
-            q.push(bound);
+        let mut samples = Samples::along(problem.path, stations, &geometry);
+        add_caps(problem, &mut samples);
+        let mut sweeper = Sweeper::new();
+        sweeper.run(&samples, problem.limits);
+        let steady = steady_jerk(problem);
+        let mut constant: Vec<f64> =
+            sweeper.bounds(n).iter().zip(&geometry).map(|(bound, &g)| bound.min(steady[g])).collect();
+        passes::replace_infinities(&mut constant);
+        let q = sweeper.q(n).to_vec();
+        for (constant, q) in constant[1..n - 1].iter_mut().zip(&q[1..n - 1]) {
+            *constant = constant.min(*q);
         }
-        q[0] = 0.0;
-        q[n - 1] = 0.0;
-        replace_infinities(&mut q);
-        replace_infinities(&mut constant);
-        for k in (0..n - 1).rev() {
-            let d = 2.0 * (stations[k + 1] - stations[k]);
-            for s in &strips[k * axes..(k + 1) * axes] {
-                // Lowest w at q is (-bound - slope q)/gain; it must reach q[k+1]: q + d w <= q[k+1].
-                let (room, cost) = (s.gain * q[k + 1] + d * s.bound, s.gain - d * s.slope);
-                if cost > 0.0 {
-                    q[k] = q[k].min(room / cost);
-                }
-            }
-        }
-        for k in 0..n - 1 {
-            let d = 2.0 * (stations[k + 1] - stations[k]);
-            let w = strips[k * axes..(k + 1) * axes]
-                .iter()
-                .filter(|s| s.gain > 0.0)
-                .map(|s| (s.bound - s.slope * q[k]) / s.gain)
-                .fold(f64::INFINITY, f64::min);
-            q[k + 1] = q[k + 1].min((q[k] + d * w).max(0.0));
-        }
-        for k in 1..n - 1 {
-            constant[k] = constant[k].min(q[k]);
-        }
-        Sweep { stations, q, constant }
+        Sweep { stations: samples.stations, q, constant }
     }
 
     /// Time of the swept motion [s]: q is linear between stations.
@@ -108,22 +64,6 @@ impl Sweep {
         const OVER_MEAN: f64 = 100.0;
         let mean = self.stations[self.stations.len() - 1] / self.duration();
         self.q.iter().copied().fold(0.0, f64::max).min((OVER_MEAN * mean).powi(2))
-    }
-
-    /// Largest speed of each axis in the swept motion.
-    pub(super) fn top_speeds(&self, problem: &Problem) -> [f64; MAX_AXES] {
-        let path = problem.path;
-        let per_span = (self.stations.len() - 1) / path.spans();
-        let mut top = [0.0; MAX_AXES];
-        let mut pieces = Pieces::new(path);
-        for (k, (&u, &q)) in self.stations.iter().zip(&self.q).enumerate() {
-            let g = (k / per_span).min(path.spans() - 1);
-            let x = u - path.breaks[g] as f64 * path.step;
-            for (top, piece) in top.iter_mut().zip(pieces.at(g)) {
-                *top = (piece.first(x).abs() * q.sqrt()).max(*top);
-            }
-        }
-        top
     }
 
     /// Largest q on [from, to], the bracketing stations included; `hint` is an index into the stations at or before
@@ -147,26 +87,31 @@ fn grid_steps(u: f64, step: f64) -> u64 {
     (u / step).round() as u64
 }
 
-/// Largest q at which every axis' strip leaves a common path acceleration.
-fn curve_bound(strips: &[Strip]) -> f64 {
-    let mut q = f64::INFINITY;
-    for (i, a) in strips.iter().enumerate() {
-        if a.gain == 0.0 {
-            q = q.min(a.bound / a.slope.abs());
-        }
-        for b in &strips[i + 1..] {
-            // Each axis' lower limit against the other's upper limit, both multiplied out.
-            let turn = (a.slope * b.gain - b.slope * a.gain).abs();
-            q = q.min((a.bound * b.gain + b.bound * a.gain) / turn);
+/// Adds what the caps on the path speed allow at each station.
+fn add_caps(problem: &Problem, samples: &mut Samples) {
+    if problem.caps.is_empty() {
+        return;
+    }
+    for k in 0..samples.stations.len() {
+        let at = grid_steps(samples.stations[k], problem.path.step);
+        let caps = strictest(problem.caps, at.saturating_sub(1), at + 1);
+        samples.bound(k, caps.rate * caps.rate);
+        for (mask, speed) in caps.tangential.iter().flatten() {
+            let counted = (0..samples.axes()).filter(|a| mask >> a & 1 == 1);
+            let square: f64 = counted.map(|a| samples.first_at(a, k).powi(2)).sum();
+            samples.bound(k, speed * speed / square);
         }
     }
-    if q.is_nan() { f64::INFINITY } else { q }
 }
 
-/// Where nothing bounds q (no axis moves), the path's largest finite bound stands in.
-fn replace_infinities(q: &mut [f64]) {
-    let largest = q.iter().copied().filter(|q| q.is_finite()).fold(0.0, f64::max);
-    q.iter_mut().filter(|q| !q.is_finite()).for_each(|q| *q = largest);
+/// Largest q of a steady speed under the jerk limits, per geometry span: |p'''| q^(3/2) <= J.
+fn steady_jerk(problem: &Problem) -> Vec<f64> {
+    let mut pieces = Pieces::new(problem.path);
+    let mut span = |g| {
+        let ratios = pieces.at(g).iter().zip(problem.limits).map(|(p, l)| p.third().abs() / l.jerk);
+        ratios.fold(0.0, f64::max).powf(-2.0 / 3.0)
+    };
+    (0..problem.path.spans()).map(&mut span).collect()
 }
 
 /// Stations and the geometry span each lies in: denser towards the ends of a geometry span where spans are few.

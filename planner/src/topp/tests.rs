@@ -2,6 +2,7 @@
 
 mod families;
 mod oracle;
+mod sweep;
 
 use proptest::prelude::*;
 

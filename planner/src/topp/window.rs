@@ -1,12 +1,14 @@
 //! Paths of any length: windows solved side by side, then once more round their joints.
 
+use std::cell::RefCell;
+
 use rayon::prelude::*;
 
-use super::ipm::{SCALINGS, START_SLACK, Stretch, Workspace};
+use super::ipm::{Run, Stretch, Workspace};
 use super::rows::RowSource;
 
 /// Spans per window.
-const WINDOW: usize = 2000;
+const WINDOW: usize = 4000;
 /// Spans re-solved on either side of a joint.
 const REACH: usize = 250;
 /// What the first stage leaves below every limit round a joint, so that the second starts well inside. Of the time it
@@ -16,6 +18,31 @@ const JOINT_MARGIN: f64 = 5e-3;
 /// Longest problem that is solved in one piece.
 pub(super) const WHOLE: usize = WINDOW + WINDOW / 4;
 
+thread_local! {
+    static WORKSPACE: RefCell<Workspace> = RefCell::default();
+}
+
+/// Runs `f` in this thread's workspace: memory that has been touched once is kept. `f` must not wait for other threads.
+fn in_workspace<R>(f: impl FnOnce(&mut Workspace) -> R) -> R {
+    WORKSPACE.with_borrow_mut(f)
+}
+
+/// All runs together.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Total {
+    /// Iterations.
+    pub(super) iterations: u64,
+    /// What the control values can at most be above the optimum of every stretch with the others held, as the
+    /// kernel counts time.
+    pub(super) gap: f64,
+}
+
+impl Total {
+    fn of(run: Run) -> Self {
+        Total { iterations: u64::from(run.iterations), gap: run.gap }
+    }
+}
+
 /// Turns the start profile `x` into the optimum and returns the iterations; `None` when no scale makes it feasible.
 pub(super) fn solve(
     source: &RowSource,
@@ -23,15 +50,16 @@ pub(super) fn solve(
     half: &[f64],
     relative_gap: f64,
     whole: usize,
-) -> Option<u64> {
+) -> Option<Total> {
     let m = x.len();
     if m <= whole {
-        let mut work = Workspace::default();
-        work.load(source, x, half, Stretch { from: 0, to: m }, |_| 0.0);
-        work.scale_into()?;
-        let iterations = work.solve(relative_gap);
-        *x = work.moved();
-        return Some(u64::from(iterations));
+        return in_workspace(|work| {
+            work.load(source, x, half, Stretch { from: 0, to: m }, |_| 0.0);
+            work.scale_into()?;
+            let run = work.solve(relative_gap);
+            *x = work.moved();
+            Some(Total::of(run))
+        });
     }
     scale_all(source, x, half)?;
     let count = m.div_ceil(WINDOW);
@@ -54,7 +82,8 @@ pub(super) fn solve(
     let seams: Vec<Stretch> =
         joints[1..count].iter().map(|&j| Stretch { from: j - REACH, to: j + REACH }).collect();
     let second = stage(source, x, half, &seams, |_| 0.0, relative_gap);
-    Some(first + second)
+    // The second stage starts where the first ended, and what it leaves undone comes on top.
+    Some(Total { iterations: first.iterations + second.iterations, gap: first.gap + second.gap })
 }
 
 /// Solves disjoint stretches that share no row, all from the same `x`.
@@ -65,42 +94,44 @@ pub(super) fn stage(
     stretches: &[Stretch],
     margin: impl Fn(usize) -> f64 + Sync,
     relative_gap: f64,
-) -> u64 {
+) -> Total {
     let before: &[f64] = x;
-    let solved: Vec<(Vec<f64>, u32)> = stretches
+    let solved: Vec<(Vec<f64>, Run)> = stretches
         .par_iter()
-        .map_init(Workspace::default, |work, &stretch| {
-            work.load(source, before, half, stretch, &margin);
-            let iterations = if work.settle() > 0.0 { work.solve(relative_gap) } else { 0 };
-            (if iterations == 0 { Vec::new() } else { work.moved() }, iterations)
+        .map(|&stretch| {
+            in_workspace(|work| {
+                work.load(source, before, half, stretch, &margin);
+                let run = if work.settle() > 0.0 { work.solve(relative_gap) } else { Run::default() };
+                (if run.iterations == 0 { Vec::new() } else { work.moved() }, run)
+            })
         })
         .collect();
-    let mut iterations = 0;
-    for (stretch, (values, count)) in stretches.iter().zip(solved) {
+    let mut total = Total::default();
+    for (stretch, (values, run)) in stretches.iter().zip(solved) {
         if !values.is_empty() {
             x[stretch.from..stretch.to].copy_from_slice(&values);
         }
-        iterations += u64::from(count);
+        total.iterations += u64::from(run.iterations);
+        total.gap += run.gap;
     }
-    iterations
+    total
 }
 
 /// Scales the whole profile until its least slack is comfortable everywhere.
 pub(super) fn scale_all(source: &RowSource, x: &mut [f64], half: &[f64]) -> Option<()> {
     let m = x.len();
-    for _ in 0..SCALINGS {
-        let starts: Vec<usize> = (0..m).step_by(WINDOW / 4).collect();
-        let least = starts
-            .par_iter()
-            .map_init(Workspace::default, |work, &from| {
-                work.load(source, x, half, Stretch { from, to: (from + WINDOW / 4).min(m) }, |_| 0.0);
-                work.settle()
+    let starts: Vec<usize> = (0..m).step_by(WINDOW / 8).collect();
+    let before: &[f64] = x;
+    let scale = starts
+        .par_iter()
+        .map(|&from| {
+            in_workspace(|work| {
+                let stretch = Stretch { from, to: (from + WINDOW / 8).min(m) };
+                work.load(source, before, half, stretch, |_| 0.0);
+                work.scale_into()
             })
-            .reduce(|| f64::INFINITY, f64::min);
-        if least > START_SLACK {
-            return Some(());
-        }
-        x.iter_mut().for_each(|x| *x *= 0.8);
-    }
-    None
+        })
+        .try_reduce(|| 1.0, |a, b| Some(a.min(b)))?;
+    x.iter_mut().for_each(|x| *x *= scale);
+    Some(())
 }

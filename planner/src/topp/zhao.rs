@@ -11,7 +11,7 @@
 use super::ipm::Stretch;
 use super::layout::Layout;
 use super::rows::RowSource;
-use super::window::{scale_all, stage};
+use super::window::{Total, scale_all, stage};
 
 /// Spans per segment; the contour of section 3.3.1 has 300 points in each.
 const SEGMENT: usize = 300;
@@ -26,8 +26,8 @@ const SLOW_REACH: usize = 2;
 /// Longest problem that is solved in one piece.
 const WHOLE: usize = SEGMENT + SEGMENT / 4;
 
-/// Turns the start profile `x` into a plan and returns the iterations; `None` when no scale makes it feasible.
-pub(super) fn solve(source: &RowSource, x: &mut [f64], half: &[f64], relative_gap: f64) -> Option<u64> {
+/// Turns the start profile `x` into a plan and returns what it took; `None` when no scale makes it feasible.
+pub(super) fn solve(source: &RowSource, x: &mut [f64], half: &[f64], relative_gap: f64) -> Option<Total> {
     let m = x.len();
     scale_all(source, x, half)?;
     let joints = joints(m);
@@ -39,7 +39,8 @@ pub(super) fn solve(source: &RowSource, x: &mut [f64], half: &[f64], relative_ga
     let splices = splices(x, &joints);
     let spliced = stage(source, x, half, &splices, |_| SPLICED, relative_gap);
     let renewed = stage(source, x, half, &segments, |_| 0.0, relative_gap);
-    Some(prepared + spliced + renewed)
+    let iterations = prepared.iterations + spliced.iterations + renewed.iterations;
+    Some(Total { iterations, gap: prepared.gap + spliced.gap + renewed.gap })
 }
 
 /// Control values at which segments meet, the ends of the path among them.
@@ -84,14 +85,13 @@ fn splices(x: &[f64], joints: &[usize]) -> Vec<Stretch> {
     splices
 }
 
-/// More cells for the spans round the slow places next to each joint, `speed` being an estimate of q on each span.
+/// More cells for the spans round the slow places next to each joint, `speed` being an estimate of q on each inner span.
 pub(super) fn refine(layout: &mut Layout, speed: &[f64]) {
     let joints = joints(layout.unknowns());
     if joints.len() == 2 {
         return;
     }
-    let inner = &speed[1..speed.len() - 1];
-    for splice in splices(inner, &joints) {
+    for splice in splices(speed, &joints) {
         for slow in [splice.from, splice.to] {
             // Control value j belongs to span j + 1.
             for cells in &mut layout.cells[slow + 1 - SLOW_REACH..=slow + 1 + SLOW_REACH] {

@@ -47,6 +47,14 @@ pub struct BoundingBox {
 }
 
 impl BoundingBox {
+    /// Grows to hold a position.
+    pub fn hold(&mut self, p: &Point) {
+        for (i, x) in p.iter().enumerate() {
+            self.min[i] = self.min[i].min(*x);
+            self.max[i] = self.max[i].max(*x);
+        }
+    }
+
     /// Grows `slot` to hold this box.
     pub(super) fn join_into(self, slot: &mut Option<BoundingBox>) {
         let joined = slot.get_or_insert(self);

@@ -56,7 +56,11 @@ pub(super) fn section(
     let deviation = fit.deviation(&path, &grid);
     let end = path.grid_length();
     let marks = Marks {
-        caps: vec![FeedCap { until: end, speed: feed.map_or(SpeedCap::None, |f| fit.cap(f)) }],
+        caps: vec![FeedCap {
+            until: end,
+            speed: feed
+                .map_or(SpeedCap::None, |speed| SpeedCap::Tangential { axes: points.counted(), speed }),
+        }],
         blocks: grid
             .at
             .iter()
@@ -316,13 +320,6 @@ impl Fit<'_> {
         };
         let resolution = size(halves(AxisKind::Linear), halves(AxisKind::Rotary));
         Deviation { tolerance_mm: self.points.machine.tolerance_mm.max(resolution), bound_mm, line }
-    }
-
-    /// The programmed feed: along the linear axes, or along the rotary ones if no other has a column.
-    fn cap(&self, speed: f64) -> SpeedCap {
-        let counted = if self.points.has_linear() { AxisKind::Linear } else { AxisKind::Rotary };
-        let axes = self.points.machine.axes.iter().enumerate().filter(|(_, a)| a.kind == counted);
-        SpeedCap::Tangential { axes: axes.fold(0, |mask, (i, _)| mask | 1 << i), speed }
     }
 }
 

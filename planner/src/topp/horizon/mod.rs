@@ -13,6 +13,7 @@ mod draft;
 mod path;
 mod record;
 mod solve;
+mod speeds;
 mod window;
 
 use std::time::Instant;
@@ -27,6 +28,7 @@ use super::rounding;
 use crate::job::machine::AxisLimits;
 pub(super) use draft::Draft;
 use path::Arrived;
+pub(super) use speeds::swept;
 
 /// How far ahead to look, and how much to commit at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,7 @@
 //! The motion of one window on given knots.
 
 use super::draft::Draft;
+use super::speeds::tops;
 use super::{Deadline, Horizon};
 use crate::feed::table::FeedTable;
 use crate::tolerances::ROW_ARITHMETIC;
@@ -118,7 +119,7 @@ impl<'a> Window<'a> {
         let q = slow * source.unit;
         let top = self.sweep.top().sqrt();
         let share = |limit: f64, speed: f64| GAIN * limit * top / speed;
-        let speeds = self.sweep.top_speeds(&source.problem);
+        let speeds = tops(&source.problem, self.sweep);
         let distance = source
             .problem
             .limits
@@ -151,13 +152,18 @@ impl<'a> Window<'a> {
         let free = Stretch { from: self.from(), to: (self.improved - 1).min(m) };
         let work = &mut horizon.work;
         work.deadline = deadline;
+        // Where the start bends no more than the format allows, neither will the answer.
+        let bending = [true, false].map(|bends| RowSource { bends, ..source.clone() });
         for [drawn, share] in STARTS {
             let mut x = start.at(drawn);
             let margin =
                 |s: usize| if s + 2 >= self.commit && self.commit < m { share * MARGIN } else { 0.0 };
-            work.load(source, &x, &start.half, free, margin);
-            if work.settle() > 0.0 {
-                let iterations = work.solve(horizon.settings.relative_gap);
+            for source in &bending {
+                work.load(source, &x, &start.half, free, margin);
+                if work.settle() <= 0.0 {
+                    continue;
+                }
+                let iterations = work.solve(horizon.settings.relative_gap).iterations;
                 if iterations > 0 {
                     x[free.from..free.to].copy_from_slice(&work.moved());
                 }

@@ -2,10 +2,11 @@
 
 use super::draft::Draft;
 use super::solve::Window;
+use super::speeds::{braking, swept};
 use super::{Commit, Deadline, Horizon, Stop};
 use crate::feed::table::FeedTable;
 use crate::geometry::grid_path::GridPath;
-use crate::topp::problem::{Problem, Settings};
+use crate::topp::problem::{JerkForm, Problem, RowForm, Settings};
 use crate::topp::rows::RowSource;
 use crate::topp::sweep::Sweep;
 use crate::topp::{PlanError, error, joints, knots, rounding};
@@ -78,18 +79,6 @@ pub(super) fn advance(horizon: &mut Horizon, deadline: Deadline) -> Result<Optio
     }
 }
 
-/// Longest distance from the fastest motion to rest, in u.
-fn braking(problem: &Problem, sweep: &Sweep) -> f64 {
-    let slowest = problem
-        .limits
-        .iter()
-        .zip(sweep.top_speeds(problem))
-        .filter(|(_, top)| *top > 0.0)
-        .map(|(l, top)| top / l.acceleration + l.acceleration / l.jerk)
-        .fold(0.0, f64::max);
-    0.5 * sweep.top().sqrt() * slowest
-}
-
 /// How far a window on `path` goes that starts at `from`; the error is how many grid steps of path are missing.
 fn reach(horizon: &Horizon, path: &GridPath, from: u64, whole: bool, longer: f64) -> Result<Reach, u64> {
     let end = path.grid_length();
@@ -136,6 +125,7 @@ fn improve(
         let layout = draft.layout(problem.path);
         let n = layout.spans();
         let ceiling = horizon.settings.headroom * horizon.settings.headroom;
+        let swept = swept(problem, &layout, sweep, horizon.unit);
         let source = RowSource {
             problem: *problem,
             layout: &layout,
@@ -143,6 +133,10 @@ fn improve(
             ceiling,
             joint: joints(problem, &layout).map(|q| (q / horizon.unit).min(ceiling)),
             largest_code: rounding::LONG_CODE,
+            swept: &swept,
+            jerk: JerkForm::True,
+            form: RowForm::Bernstein,
+            bends: false,
         };
         let until = |place: u64| layout.knots.partition_point(|&k| k <= place) - 1;
         let complete = reach.commit == reach.end;

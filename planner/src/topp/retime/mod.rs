@@ -12,10 +12,10 @@ mod slow;
 pub use rules::{RetimeError, Retimed, Rules, scaled};
 
 use super::check;
-use super::horizon::{Deadline, Draft};
+use super::horizon::{Deadline, Draft, swept};
 use super::ipm::{Stretch, Workspace};
 use super::layout::Layout;
-use super::problem::Problem;
+use super::problem::{JerkForm, Problem, RowForm};
 use super::rows::RowSource;
 use super::sweep::Sweep;
 use super::{error, joints, rounding};
@@ -77,7 +77,7 @@ pub fn retime(
     let mut iterations = 0;
     for _ in 0..MOST_DIVISIONS {
         let layout = draft.layout(&table.path);
-        let source = task.source(new, &layout);
+        let source = task.source(new, &layout, &[]);
         let parts = match task.solve(&layout, &draft.carried[1..], &mut iterations) {
             Ok(found) => match check::format(&layout, &found.table) {
                 Some(parts) => parts,
@@ -123,26 +123,41 @@ impl<'a> Task<'a> {
         Draft { knots, cells, carried, improved: n, lasting: n }
     }
 
-    fn source<'s>(&'s self, rules: Rules<'s>, layout: &'s Layout) -> RowSource<'s> {
-        let problem = Problem {
-            path: &self.table.path,
-            limits: rules.limits,
-            caps: rules.caps,
-            control_tick_s: self.control_tick_s,
-        };
+    fn problem<'s>(&'s self, rules: Rules<'s>) -> Problem<'s> {
+        let Rules { limits, caps } = rules;
+        Problem { path: &self.table.path, limits, caps, control_tick_s: self.control_tick_s }
+    }
+
+    fn source<'s>(&'s self, rules: Rules<'s>, layout: &'s Layout, swept: &'s [f64]) -> RowSource<'s> {
+        let problem = self.problem(rules);
         let largest_code = rounding::LONG_CODE;
         let ceiling = f64::from(self.table.q_scale) * largest_code * largest_code / self.unit;
         let joint = joints(&problem, layout).map(|q| (q / self.unit).min(ceiling));
-        RowSource { problem, layout, unit: self.unit, ceiling, joint, largest_code }
+        let (jerk, form) = (JerkForm::True, RowForm::Bernstein);
+        RowSource {
+            problem,
+            layout,
+            unit: self.unit,
+            ceiling,
+            joint,
+            largest_code,
+            swept,
+            jerk,
+            form,
+            bends: false,
+        }
     }
 
     /// Solves on given knots; `x` is the old plan there.
     fn solve(&self, layout: &Layout, x: &[f64], iterations: &mut u32) -> Result<Retimed, RetimeError> {
         let x = &x[..layout.unknowns()];
-        let (before, after) = (self.source(self.old, layout), self.source(self.new, layout));
+        let sweeps = [self.old, self.new].map(|rules| Sweep::new(&self.problem(rules)));
+        let swept = sweeps.each_ref().map(|s| swept(&self.problem(self.old), layout, s, self.unit));
+        let (before, after) =
+            (self.source(self.old, layout, &swept[0]), self.source(self.new, layout, &swept[1]));
         // The way down is faster than anything the new limits allow.
-        let [slow, fast] = [&before, &after]
-            .map(|source| rounding::halves(source, self.table.q_scale, &Sweep::new(&source.problem)));
+        let [slow, fast] = [(&before, &sweeps[0]), (&after, &sweeps[1])]
+            .map(|(source, sweep)| rounding::halves(source, self.table.q_scale, sweep));
         let mut half: Vec<f64> = slow.into_iter().zip(fast).map(|(a, b)| a.max(b)).collect();
         half[..self.knot].fill(0.0);
         let mut work = Workspace::default();
@@ -171,7 +186,7 @@ impl<'a> Task<'a> {
         half[..from].fill(0.0);
         work.load(&after, &y, &half, Stretch { from, to: m }, |_| 0.0);
         if work.settle() > 0.0 {
-            *iterations += work.solve(self.relative_gap);
+            *iterations += work.solve(self.relative_gap).iterations;
             y[from..].copy_from_slice(&work.moved());
         }
         let table = self.assemble(&after, &y);
