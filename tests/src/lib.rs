@@ -2,5 +2,6 @@
 
 pub mod chain;
 pub mod judge;
+pub mod meander;
 pub mod oracle;
 pub mod tables;

@@ -5,6 +5,7 @@
     reason = "criterion's macros make items; a bench stops on an error"
 )]
 
+mod horizon;
 mod paths;
 
 use std::hint::black_box;
@@ -132,5 +133,9 @@ fn short() -> Criterion {
         .without_plots()
 }
 
-criterion_group!(name = benches; config = short(); targets = program, sweep, plan);
+criterion_group!(
+    name = benches;
+    config = short();
+    targets = program, sweep, plan, horizon::streamed, horizon::retimed, horizon::divided
+);
 criterion_main!(benches);

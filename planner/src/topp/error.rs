@@ -2,7 +2,7 @@
 
 use super::problem::Problem;
 use crate::geometry::section::SpeedCap;
-use crate::job::machine::MAX_AXES;
+use crate::job::machine::{AxisLimits, MAX_AXES};
 use crate::tolerances::{LARGEST_LIMIT, SMALLEST_LIMIT};
 
 /// A limit of one axis.
@@ -205,10 +205,21 @@ pub(super) fn validate(problem: &Problem) -> Result<(), PlanError> {
     if axes == 0 || axes > MAX_AXES {
         return Err(PlanError::AxisCount { axes });
     }
-    if problem.limits.len() != axes {
-        return Err(PlanError::LimitCount { limits: problem.limits.len(), axes });
+    validate_limits(problem.limits, axes)?;
+    validate_path(problem)?;
+    validate_caps(problem)?;
+    if !(problem.control_tick_s >= 0.0 && problem.control_tick_s < 0.1) {
+        return Err(PlanError::Setting { name: "control_tick_s", value: problem.control_tick_s });
     }
-    for (axis, l) in problem.limits.iter().enumerate() {
+    Ok(())
+}
+
+/// Checks the limits of `axes` axes.
+pub(super) fn validate_limits(limits: &[AxisLimits], axes: usize) -> Result<(), PlanError> {
+    if limits.len() != axes {
+        return Err(PlanError::LimitCount { limits: limits.len(), axes });
+    }
+    for (axis, l) in limits.iter().enumerate() {
         let finite = [(LimitKind::Velocity, l.velocity), (LimitKind::Acceleration, l.acceleration)];
         for (kind, value) in finite {
             if !(value >= SMALLEST_LIMIT && value.is_finite()) {
@@ -218,11 +229,6 @@ pub(super) fn validate(problem: &Problem) -> Result<(), PlanError> {
         if l.jerk.is_nan() || l.jerk < SMALLEST_LIMIT {
             return Err(PlanError::Limit { axis, kind: LimitKind::Jerk, value: l.jerk });
         }
-    }
-    validate_path(problem)?;
-    validate_caps(problem)?;
-    if !(problem.control_tick_s >= 0.0 && problem.control_tick_s < 0.1) {
-        return Err(PlanError::Setting { name: "control_tick_s", value: problem.control_tick_s });
     }
     Ok(())
 }

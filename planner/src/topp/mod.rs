@@ -7,6 +7,7 @@
 mod check;
 mod clarabel;
 mod error;
+pub mod horizon;
 mod insert;
 mod ipm;
 mod knots;
@@ -14,6 +15,7 @@ mod lanes;
 mod layout;
 pub mod problem;
 mod rest;
+pub mod retime;
 mod rounding;
 mod rows;
 mod start;
@@ -21,6 +23,7 @@ pub mod sweep;
 #[cfg(test)]
 mod tests;
 mod window;
+mod zhao;
 
 pub use error::{LimitKind, PathFault, PlanError};
 
@@ -28,7 +31,7 @@ use crate::feed::table::FeedTable;
 use crate::job::machine::AxisLimits;
 use crate::tolerances::LARGEST_LIMIT;
 use layout::{Derivatives, Layout, Pieces, strictest};
-use problem::{Plan, Problem, Settings, Solver};
+use problem::{Plan, Problem, Settings, Solver, Windows};
 use rows::RowSource;
 use sweep::Sweep;
 
@@ -155,6 +158,11 @@ impl Attempt<'_> {
     fn solve(&self, layout: &Layout, largest_code: f64, iterations: &mut u64) -> Result<Solved, PlanError> {
         let problem = self.problem;
         let unit = self.sweep.top();
+        let mut refined = layout.clone();
+        if self.settings.windows == Windows::Zhao {
+            zhao::refine(&mut refined, &self.swept(layout));
+        }
+        let layout = &refined;
         let joints = joints(problem, layout);
         let swept = self.swept(layout);
         let mut source = self.source(layout, &swept, joints, largest_code);
@@ -334,7 +342,11 @@ impl Attempt<'_> {
             let source = &RowSource { bends, ..source.clone() };
             let (x, gap, count) = match self.settings.solver {
                 Solver::InteriorPoint => {
-                    let total = window::solve(source, &mut x, half, gap, self.whole)?;
+                    let total = match self.settings.windows {
+                        Windows::Whole => window::solve(source, &mut x, half, gap, usize::MAX)?,
+                        Windows::Overlap => window::solve(source, &mut x, half, gap, self.whole)?,
+                        Windows::Zhao => zhao::solve(source, &mut x, half, gap)?,
+                    };
                     (x, total.gap, total.iterations)
                 }
                 Solver::Clarabel => {

@@ -15,7 +15,12 @@ const SINGLE: f64 = 1.3e-7;
 
 /// Size of a squared code such that control values up to `ceiling` V^2 have a code.
 pub(super) fn scale(rows: &RowSource) -> f32 {
-    let exact = rows.unit * rows.ceiling / (rows.largest_code * rows.largest_code);
+    scale_of(rows.unit * rows.ceiling, rows.largest_code)
+}
+
+/// Size of a squared code such that q up to `top` has a code.
+pub(super) fn scale_of(top: f64, largest_code: f64) -> f32 {
+    let exact = top / (largest_code * largest_code);
     let single = exact as f32;
     if f64::from(single) < exact { single.next_up() } else { single }
 }

@@ -87,7 +87,7 @@ pub(super) fn solve(
 }
 
 /// Solves disjoint stretches that share no row, all from the same `x`.
-fn stage(
+pub(super) fn stage(
     source: &RowSource,
     x: &mut [f64],
     half: &[f64],

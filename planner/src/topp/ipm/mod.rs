@@ -10,6 +10,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use self::band::Band;
 use self::block::Rows;
+use super::horizon::Deadline;
 use super::lanes::{LANES, Lanes, product, scaled, totals};
 use super::rows::{CellRows, RowBuilder, RowSource};
 
@@ -24,7 +25,7 @@ const LEAST_CENTRING: f64 = 1e-5;
 /// Most iterations; runs end after 13 to 30.
 const MOST_ITERATIONS: u32 = 80;
 /// Least slack a start is scaled down to.
-const START_SLACK: f64 = 0.02;
+pub(super) const START_SLACK: f64 = 0.02;
 /// Slack of a jerk row beyond which a better tangent is not looked for.
 const ENOUGH: f64 = 0.1;
 /// Most reductions of a start, by a fifth each.
@@ -67,6 +68,8 @@ pub(super) struct Workspace {
     correction: Vec<f64>,
     affine: Vec<f64>,
     dc: Vec<f64>,
+    /// When to stop early.
+    pub(super) deadline: Deadline,
 }
 
 /// How a run ended.
@@ -205,6 +208,9 @@ impl Workspace {
                 best_time = time;
                 run.gap = gap;
                 self.best.clone_from(&self.c);
+            }
+            if self.deadline.passed(iteration) {
+                return run;
             }
             if gap < relative_gap * time && (time - last_time).abs() < relative_gap * time {
                 return run;

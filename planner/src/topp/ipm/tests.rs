@@ -3,7 +3,6 @@
 use super::*;
 use crate::geometry::grid_path::{GridAxis, GridPath};
 use crate::job::machine::AxisLimits;
-use crate::topp::layout::Layout;
 use crate::topp::problem::{JerkForm, Problem, RowForm, Settings};
 use crate::topp::sweep::Sweep;
 use crate::topp::{knots, start};
@@ -33,7 +32,7 @@ fn loaded<R>(jerk: JerkForm, f: impl FnOnce(&RowSource, &mut Workspace) -> R) ->
     let limits = [AxisLimits { velocity: V, acceleration: A, jerk: J }; 5];
     let problem = Problem { path: &path, limits: &limits, caps: &[], control_tick_s: 1e-3 };
     let sweep = Sweep::new(&problem);
-    let layout: Layout = knots::place(&problem, &Settings::default(), &sweep).unwrap();
+    let (layout, _) = knots::place(&problem, &Settings::default(), &sweep).unwrap();
     let unit = sweep.q.iter().copied().fold(0.0, f64::max);
     let swept = vec![1.0; layout.unknowns()];
     let source = RowSource {
