@@ -22,6 +22,7 @@ mod start;
 pub mod sweep;
 #[cfg(test)]
 mod tests;
+mod uneven;
 mod window;
 mod zhao;
 
@@ -46,6 +47,8 @@ const MOST_RESCALES: usize = 6;
 /// Headroom of the codes above the swept q.
 const CEILING: f64 = 1.1;
 
+/// Rounds of dividing spans where that saves time.
+const MOST_ROUNDS: usize = 2;
 /// What finer codes make of the ceiling: half the top speed makes them twice as fine.
 const FINER: f64 = 0.25;
 
@@ -72,17 +75,47 @@ fn plan_whole_up_to(whole: usize, problem: &Problem, settings: &Settings) -> Res
     let attempt = Attempt { whole, problem, settings, sweep: &sweep };
     let mut iterations = 0;
     let mut fault = None;
+    // What coarse knots give.
+    let (mut coarse, mut rounds): (Option<Plan>, usize) = (None, 0);
     for _ in 0..MOST_SOLUTIONS {
-        layout = match attempt.solve(&layout, largest_code, &mut iterations)? {
-            Solved::Plan(plan) => return Ok(Plan { iterations, ..plan }),
-            Solved::Divided(finer) => finer,
-            Solved::Indivisible(e) => {
+        layout = match attempt.solve(&layout, largest_code, &mut iterations) {
+            Ok(Solved::Plan(plan)) => {
+                let seconds = plan.table.duration();
+                let before = coarse.as_ref().map_or(f64::INFINITY, |plan| plan.table.duration());
+                if seconds >= before * (1.0 - settings.largest_loss) {
+                    return Ok(Plan {
+                        iterations,
+                        ..if seconds < before { plan } else { coarse.unwrap_or(plan) }
+                    });
+                }
+                let step = f64::from(plan.table.q_scale).sqrt();
+                let parts = if rounds < MOST_ROUNDS {
+                    uneven::parts(problem, settings, &layout, &plan.table, step)
+                } else {
+                    None
+                };
+                let Some(Ok(finer)) = parts.map(|parts| knots::refine(problem.path, &layout, &parts)) else {
+                    return Ok(Plan { iterations, ..plan });
+                };
+                rounds += 1;
+                coarse = Some(plan);
+                finer
+            }
+            Ok(Solved::Divided(finer)) => finer,
+            Ok(Solved::Indivisible(e)) => {
                 fault = Some(e);
                 break;
             }
+            Err(e) => match coarse {
+                Some(plan) => return Ok(Plan { iterations, ..plan }),
+                None => return Err(e),
+            },
         };
         // Spans that had to be divided are short: finer codes keep rounding from slowing them.
         largest_code = rounding::LONG_CODE;
+    }
+    if let Some(plan) = coarse {
+        return Ok(Plan { iterations, ..plan });
     }
     let uneven = PlanError::Uneven { span: 0, u: 0.0 };
     attempt.gentle(&placed, &mut iterations).ok_or(fault.unwrap_or(uneven))
@@ -131,6 +164,9 @@ fn validate_settings(settings: &Settings) -> Result<(), PlanError> {
     }
     if !sound(settings.spans_per_ramp) {
         return Err(PlanError::Setting { name: "spans_per_ramp", value: settings.spans_per_ramp });
+    }
+    if settings.largest_loss.is_nan() || settings.largest_loss < 0.0 {
+        return Err(PlanError::Setting { name: "largest_loss", value: settings.largest_loss });
     }
     Ok(())
 }
