@@ -45,7 +45,17 @@ impl Case {
 
     /// Long motions are many short ones: ten thousand cases are to be a matter of minutes.
     fn small(&self) -> bool {
-        let seconds = swept_time(&self.path, &self.limits, &self.caps, 4);
+        let mut from = 0;
+        let mut capped = 0.0;
+        for cap in &self.caps {
+            let length = (cap.until - from) as f64 * self.path.step;
+            from = cap.until;
+            capped += match cap.speed {
+                SpeedCap::None => 0.0,
+                SpeedCap::Rate(speed) | SpeedCap::Tangential { speed, .. } => length / speed,
+            };
+        }
+        let seconds = capped.max(swept_time(&self.path, &self.limits, &self.caps, 4));
         let ramps = self.limits.iter().filter(|l| l.jerk.is_finite()).map(|l| l.acceleration / l.jerk);
         let ramp_s = ramps.fold(seconds, f64::min);
         seconds <= LONGEST_S && seconds <= MOST_RAMPS * ramp_s.max(self.tick_s)
