@@ -318,23 +318,29 @@ impl<'a> Estimate<'a> {
 /// asks for nothing.
 fn ramps(problem: &Problem, sweep: &Sweep) -> Vec<f64> {
     const SPEED_RAMP_SHARE: f64 = 0.08;
-    let top = sweep.top().sqrt();
+    let top: Vec<AxisLimits> = sweep
+        .top_speeds(problem)
+        .iter()
+        .zip(problem.limits)
+        .map(|(&velocity, l)| AxisLimits { velocity, ..*l })
+        .collect();
     let swept = sweep.duration();
     let least = problem.control_tick_s.max(1e-6 * swept);
     each_station(problem, sweep, |axes, x| {
-        let [acceleration, jerk] = along(axes, x, problem.limits);
+        let [top, acceleration, jerk] = along(axes, x, &top);
         let ramp = (acceleration / jerk).max(SPEED_RAMP_SHARE * top / acceleration);
         if ramp.is_finite() { ramp.max(least) } else { 0.1 * swept }
     })
 }
 
-/// Largest acceleration and jerk along the path at `x` of a geometry span, if it were straight.
-fn along(axes: &[Piece], x: f64, limits: &[AxisLimits]) -> [f64; 2] {
-    let mut most = [f64::INFINITY; 2];
+/// Largest speed, acceleration and jerk along the path at `x` of a geometry span, if it were straight.
+fn along(axes: &[Piece], x: f64, limits: &[AxisLimits]) -> [f64; 3] {
+    let mut most = [f64::INFINITY; 3];
     for (piece, l) in axes.iter().zip(limits) {
         let slope = piece.first(x).abs();
         if slope > 0.0 {
-            most = [most[0].min(l.acceleration / slope), most[1].min(l.jerk / slope)];
+            let limits = [l.velocity, l.acceleration, l.jerk];
+            most = [0, 1, 2].map(|k| most[k].min(limits[k] / slope));
         }
     }
     most
@@ -369,7 +375,7 @@ fn rest_lengths(problem: &Problem, sweep: &Sweep, ramp_s: &[f64]) -> ([f64; 2], 
         let jerk = loop {
             // The slope at an end may vanish: the one at the joint counts too.
             let at_joint = limits_at(length);
-            let [acceleration, jerk] = [0, 1].map(|k| at_end[k].min(at_joint[k]));
+            let [acceleration, jerk] = [1, 2].map(|k| at_end[k].min(at_joint[k]));
             // Acceleration saturates exactly at the joint: J T^3/6 with T = A/J along the path; where jerk hardly
             // matters, T is two ticks or a small share of the ramp.
             let t = (acceleration / jerk).max(0.05 * ramp_s[k]).max(2.0 * problem.control_tick_s);

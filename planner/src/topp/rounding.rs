@@ -1,10 +1,10 @@
 //! Rounding the control values to the table's codes, and what it may change.
 
-use super::layout::{Layout, Pieces};
+use super::layout::{Layout, Pieces, strictest};
 use super::rows::RowSource;
 use super::sweep::Sweep;
 use crate::feed::table::FeedTable;
-use crate::job::machine::AxisLimits;
+use crate::job::machine::{AxisLimits, MAX_AXES};
 
 /// Largest code of a table that 16 bits serve.
 pub(super) const SHORT_CODE: f64 = 65535.0;
@@ -51,11 +51,17 @@ pub(super) fn halves(rows: &RowSource, scale: f32, sweep: &Sweep) -> Vec<f64> {
         .collect();
     let fold = rows.fold();
     let mut pieces = Pieces::new(path);
+    let knots: Vec<f64> = (1..layout.spans()).map(|k| at_knot(rows, k, &mut pieces)).collect();
+    let h = &layout.h;
     (0..m)
         .map(|j| {
             let i = j + 1;
             let bound = swept[i - 1].max(swept[i]).max(swept[i + 1]);
             let c = (HEADROOM * bound).min(rows.ceiling).min(rows.shortest_bound(j, &mut pieces));
+            // x at a knot is a mean of the control values on its sides: beside a slow place they are small.
+            let left = knots[i - 1] * (h[i - 1] + h[i]) / h[i - 1];
+            let right = knots[i] * (h[i] + h[i + 1]) / h[i + 1];
+            let c = c.min(left).min(right);
             if j == 0 {
                 fold[0] * (2.0 * (rows.joint[0] * s).sqrt() + s + SINGLE * rows.joint[0])
             } else if j + 1 == m {
@@ -65,6 +71,25 @@ pub(super) fn halves(rows: &RowSource, scale: f32, sweep: &Sweep) -> Vec<f64> {
             }
         })
         .collect()
+}
+
+/// Largest x that velocity limits and caps allow at knot `k`.
+fn at_knot(rows: &RowSource, k: usize, pieces: &mut Pieces) -> f64 {
+    let (layout, problem) = (rows.layout, &rows.problem);
+    let g = layout.geometry[k] as usize;
+    let x = (layout.knots[k] - problem.path.breaks[g]) as f64 * problem.path.step;
+    let mut slopes = [0.0; MAX_AXES];
+    slopes.iter_mut().zip(pieces.at(g)).for_each(|(slope, piece)| *slope = piece.first(x).abs());
+    let speed =
+        problem.limits.iter().zip(slopes).fold(f64::INFINITY, |m, (l, slope)| m.min(l.velocity / slope));
+    let speed = [k - 1, k].iter().fold(speed, |m, &span| {
+        let caps = strictest(problem.caps, layout.knots[span], layout.knots[span + 1]);
+        caps.tangential.iter().flatten().fold(m.min(caps.rate), |m, (mask, speed)| {
+            let square: f64 = (0..MAX_AXES).filter(|a| mask >> a & 1 == 1).map(|a| slopes[a].powi(2)).sum();
+            m.min(speed / square.sqrt())
+        })
+    });
+    speed * speed / rows.unit
 }
 
 /// The table of the control values `x`.

@@ -15,6 +15,7 @@ pub use samples::{Samples, SamplesError};
 
 use super::layout::{Pieces, strictest};
 use super::problem::Problem;
+use crate::job::machine::MAX_AXES;
 
 /// q*(u) at stations along the path.
 #[derive(Clone, Debug)]
@@ -64,6 +65,22 @@ impl Sweep {
         const OVER_MEAN: f64 = 100.0;
         let mean = self.stations[self.stations.len() - 1] / self.duration();
         self.q.iter().copied().fold(0.0, f64::max).min((OVER_MEAN * mean).powi(2))
+    }
+
+    /// Largest speed of each axis in the swept motion.
+    pub(super) fn top_speeds(&self, problem: &Problem) -> [f64; MAX_AXES] {
+        let path = problem.path;
+        let per_span = (self.stations.len() - 1) / path.spans();
+        let mut top = [0.0; MAX_AXES];
+        let mut pieces = Pieces::new(path);
+        for (k, (&u, &q)) in self.stations.iter().zip(&self.q).enumerate() {
+            let g = (k / per_span).min(path.spans() - 1);
+            let x = u - path.breaks[g] as f64 * path.step;
+            for (top, piece) in top.iter_mut().zip(pieces.at(g)) {
+                *top = (piece.first(x).abs() * q.sqrt()).max(*top);
+            }
+        }
+        top
     }
 
     /// Largest q on [from, to], the bracketing stations included; `hint` is an index into the stations at or before

@@ -29,40 +29,57 @@ impl Case {
         let shape = shape(chance);
         let axes = 2 + chance.below(6);
         let scale = chance.decades(-4.0, 6.0);
-        let mut path = path(chance, shape, axes, scale);
+        let path = path(chance, shape, axes, scale);
         let tick_s = [0.0, 1e-3, 1e-4][chance.below(3)];
         loop {
             let limits = limits(chance, axes, path.length());
             let caps = caps(chance, &path, &limits);
-            // Long motions are many short ones: ten thousand cases are to be a matter of minutes.
-            let seconds = swept_time(&path, &limits, &caps, 4);
-            let ramps = limits.iter().filter(|l| l.jerk.is_finite()).map(|l| l.acceleration / l.jerk);
-            let ramp_s = ramps.fold(seconds, f64::min);
-            if seconds > LONGEST_S || seconds > MOST_RAMPS * ramp_s.max(tick_s) {
-                continue;
-            }
-            if let Some(finer) = finer(&path, &limits, &caps) {
-                path.breaks.iter_mut().for_each(|b| *b <<= finer);
-                path.step *= (-f64::from(finer)).exp2();
-                let caps = caps.iter().map(|c| FeedCap { until: c.until << finer, ..*c }).collect();
-                return Case { shape, path, limits, caps, tick_s };
-            }
+            let mut case = Case { shape, path: path.clone(), limits, caps, tick_s };
+            let Some(finer) = finer(&case).filter(|_| case.small()) else { continue };
+            case.path.breaks.iter_mut().for_each(|b| *b <<= finer);
+            case.path.step *= (-f64::from(finer)).exp2();
+            case.caps.iter_mut().for_each(|c| c.until <<= finer);
+            return case;
         }
+    }
+
+    /// Long motions are many short ones: ten thousand cases are to be a matter of minutes.
+    fn small(&self) -> bool {
+        let mut from = 0;
+        let mut capped = 0.0;
+        for cap in &self.caps {
+            let length = (cap.until - from) as f64 * self.path.step;
+            from = cap.until;
+            capped += match cap.speed {
+                SpeedCap::None => 0.0,
+                SpeedCap::Rate(speed) | SpeedCap::Tangential { speed, .. } => length / speed,
+            };
+        }
+        let seconds = capped.max(swept_time(&self.path, &self.limits, &self.caps, 4));
+        let ramps = self.limits.iter().filter(|l| l.jerk.is_finite()).map(|l| l.acceleration / l.jerk);
+        let ramp_s = ramps.fold(seconds, f64::min);
+        seconds <= LONGEST_S && seconds <= MOST_RAMPS * ramp_s.max(self.tick_s)
     }
 }
 
 /// How often the grid has to be halved until no axis takes longer for a step of it than a fraction of a second, from
-/// rest or at speed: table spans last less than a second. None where 2^50 steps are too few: such a motion takes days.
-fn finer(path: &GridPath, limits: &[AxisLimits], caps: &[FeedCap]) -> Option<u32> {
+/// rest or at speed (table spans last less than a second), and until changing speed at a cap takes several steps, as on
+/// the grids of jobs. None where 2^50 steps are too few: such limits lie too far apart for one path.
+fn finer(case: &Case) -> Option<u32> {
     const FROM_REST_S: f64 = 0.2;
     const AT_SPEED_S: f64 = 0.05;
+    let Case { path, limits, caps, tick_s, .. } = case;
     let of_axis = |l: &AxisLimits| {
         let from_rest = (l.jerk * FROM_REST_S.powi(3) / 6.0).min(l.acceleration * FROM_REST_S.powi(2) / 2.0);
         from_rest.min(l.velocity * AT_SPEED_S)
     };
     let of_cap = |c: &FeedCap| match c.speed {
         SpeedCap::None => f64::INFINITY,
-        SpeedCap::Rate(speed) | SpeedCap::Tangential { speed, .. } => speed * AT_SPEED_S,
+        SpeedCap::Rate(speed) | SpeedCap::Tangential { speed, .. } => {
+            let change_s = |l: &AxisLimits| (speed / l.jerk).sqrt().max(speed / l.acceleration);
+            let change_s = limits.iter().map(change_s).fold(*tick_s, f64::max);
+            speed * AT_SPEED_S.min(change_s / 24.0)
+        }
     };
     let longest = limits.iter().map(of_axis).chain(caps.iter().map(of_cap)).fold(path.step, f64::min);
     let finer = (path.step / longest).log2().ceil() as u32;

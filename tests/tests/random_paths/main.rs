@@ -67,7 +67,10 @@ fn check(case: &Case) -> Result<(), Finding> {
             swept_time(path, limits, caps, 64)
         );
         for a in &path.axes {
-            println!("AXIS {:?}", a.controls.iter().take(12).map(|&c| c as f64 * a.lsb).collect::<Vec<_>>());
+            println!(
+                "AXIS {:?}",
+                a.controls.iter().rev().take(5).map(|&c| c as f64 * a.lsb).collect::<Vec<_>>()
+            );
         }
     }
     let plan = match plan(&problem, &Settings::default()) {
