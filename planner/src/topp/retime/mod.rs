@@ -172,6 +172,8 @@ impl<'a> Task<'a> {
         } else {
             let found = self.inside(&before, x, &half, &mut work).and_then(|(y, from)| {
                 half[self.knot..from].fill(0.0);
+                // The way down itself must not bend more than the format allows.
+                let before = RowSource { bends: true, ..before.clone() };
                 Transition { before: &before, after: &after, half: &half, from }.find(&y, &mut work)
             });
             if found.is_none() {
@@ -184,10 +186,15 @@ impl<'a> Task<'a> {
         let pinned = rounding::values(&after, &self.assemble(&after, &y));
         y[..from].copy_from_slice(&pinned[..from]);
         half[..from].fill(0.0);
-        work.load(&after, &y, &half, Stretch { from, to: m }, |_| 0.0);
-        if work.settle() > 0.0 {
-            *iterations += work.solve(self.relative_gap).iterations;
-            y[from..].copy_from_slice(&work.moved());
+        // Where the start bends no more than the format allows, neither will the answer.
+        for bends in [true, false] {
+            let source = RowSource { bends, ..after.clone() };
+            work.load(&source, &y, &half, Stretch { from, to: m }, |_| 0.0);
+            if work.settle() > 0.0 {
+                *iterations += work.solve(self.relative_gap).iterations;
+                y[from..].copy_from_slice(&work.moved());
+                break;
+            }
         }
         let table = self.assemble(&after, &y);
         let rounded = rounding::values(&after, &table);
