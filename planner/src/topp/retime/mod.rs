@@ -84,7 +84,10 @@ pub fn retime(
                 None => return Ok(found),
             },
             // Long spans leave no room to slow down in.
-            Err(fault @ RetimeError::Unmet { .. }) => task.finer(&source, &draft.carried).ok_or(fault)?,
+            Err(fault @ RetimeError::Unmet { .. }) => match task.finer(&source, &draft.carried) {
+                Some(parts) => parts,
+                None => return task.as_it_is().ok_or(fault),
+            },
             Err(fault) => return Err(fault),
         };
         let refused = RetimeError::Format { u: layout.start(&table.path, knot) };
@@ -261,6 +264,31 @@ impl<'a> Task<'a> {
         let u =
             self.table.steps[..self.knot].iter().map(|&s| f64::from(s)).sum::<f64>() * self.table.path.step;
         Retimed { table: self.table.clone(), holds_from: self.knot, holds_from_u: u, iterations: 0 }
+    }
+
+    /// The old plan, from where it keeps the new limits anyway: on its way to rest it is slow in the end.
+    fn as_it_is(&self) -> Option<Retimed> {
+        let draft = self.draft();
+        let layout = draft.layout(&self.table.path);
+        let m = layout.unknowns();
+        let (x, none) = (&draft.carried[1..=m], vec![0.0; m]);
+        let swept = vec![f64::INFINITY; m];
+        let after = self.source(self.new, &layout, &swept);
+        let mut work = Workspace::default();
+        let mut keeps = |j: usize| {
+            work.load(&after, x, &none, Stretch { from: j, to: m }, |_| 0.0);
+            work.settle() >= -ROW_ARITHMETIC
+        };
+        let (mut low, mut high) = (self.knot, m - 1);
+        if !keeps(high) {
+            return None;
+        }
+        while low < high {
+            let middle = (low + high) / 2;
+            if keeps(middle) { high = middle } else { low = middle + 1 }
+        }
+        let holds_from_u = layout.start(&self.table.path, high);
+        Some(Retimed { table: self.table.clone(), holds_from: high, holds_from_u, iterations: 0 })
     }
 
     /// How to divide the spans after the knot that take longer than half of what it takes to build up full
