@@ -1,4 +1,5 @@
 //! Tables planned anew while they are played.
+#![allow(clippy::unwrap_used, reason = "tests stop on an error")]
 
 use planner::certificate::{LimitKind, certify};
 use planner::feed::table::{FeedTable, SpanLaw};
@@ -205,7 +206,7 @@ proptest! {
             // All that is left may be the way to rest, at full limits.
             Err(RetimeError::Unmet { .. }) => {
                 let left: f64 = (knot..table.spans()).map(|i| table.law(i).duration()).sum();
-                prop_assert!(factor < 1.0 && left < 0.6, "{left} s are enough to slow down");
+                prop_assert!(factor < 1.0 && left < 1.0, "{left} s are enough to slow down");
                 return Ok(());
             }
             Err(fault) => panic!("{fault}"),
