@@ -1,4 +1,5 @@
 //! Paths planned while they arrive.
+#![allow(clippy::unwrap_used, reason = "tests stop on an error")]
 
 use std::time::{Duration, Instant};
 
@@ -105,6 +106,22 @@ fn streamed_paths_lose_almost_nothing() {
         let gap = out.table.duration() / best - 1.0;
         assert!(gap < 5e-4, "seed {seed}: {gap}");
         assert!(out.commits > 3 && out.first_output.unwrap() < spans && out.most_kept < spans);
+    }
+}
+
+#[test]
+fn a_longer_lookahead_gains_nothing() {
+    // The same on knots that are hardly affected by where windows end: what 2.5 braking distances leave to gain.
+    for (seed, axes, turn) in [(7, 2, 0.4), (8, 3, 0.7)] {
+        let path = meander(&mut Random::new(seed), axes, 120, 6.0, turn);
+        let limits = limits(axes, 100.0, 500.0, 1e4);
+        let with = |lookahead: f64| {
+            let settings = HorizonSettings { lookahead, ..HorizonSettings::default() };
+            streamed(&path, &limits, &[], settings, Deadline::NONE, 3).table.duration()
+        };
+        let [short, usual, long] = [0.3, 2.5, 8.0].map(with);
+        assert!((usual / long - 1.0).abs() < 5e-4, "{usual} {long}");
+        assert!(short > long * 1.01, "{short} {long}");
     }
 }
 

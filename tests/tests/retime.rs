@@ -1,4 +1,5 @@
 //! Tables planned anew while they are played.
+#![allow(clippy::unwrap_used, reason = "tests stop on an error")]
 
 use planner::certificate::{LimitKind, certify};
 use planner::feed::table::{FeedTable, SpanLaw};
@@ -200,7 +201,16 @@ proptest! {
         let knot = (share * table.spans() as f64) as usize;
         let caps = scaled(&caps, factor).unwrap();
         let new = Rules { limits: &limits, caps: &caps };
-        let found = again(&table, knot, old, new).unwrap();
+        let found = match again(&table, knot, old, new) {
+            Ok(found) => found,
+            // All that is left may be the way to rest, at full limits.
+            Err(RetimeError::Unmet { .. }) => {
+                let left: f64 = (knot..table.spans()).map(|i| table.law(i).duration()).sum();
+                prop_assert!(factor < 1.0 && left < 1.0, "{left} s are enough to slow down");
+                return Ok(());
+            }
+            Err(fault) => panic!("{fault}"),
+        };
         assert_sound(&table, knot, old, new, &found);
         if factor >= 1.0 {
             prop_assert!(found.table.duration() <= table.duration());

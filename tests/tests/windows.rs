@@ -1,4 +1,5 @@
 //! Divided paths against undivided ones.
+#![allow(clippy::unwrap_used, reason = "tests stop on an error")]
 
 use planner::certificate::certify;
 use planner::topp::plan;

@@ -85,7 +85,8 @@ fn reach(horizon: &Horizon, path: &GridPath, from: u64, whole: bool, longer: f64
     let [ahead, advance] =
         [horizon.settings.lookahead, horizon.settings.advance].map(|d| horizon.steps(longer * d));
     let target = from + ahead + advance;
-    if whole && end <= target + ahead {
+    // What would be left over is no window of its own.
+    if whole && end <= target + ahead.max(horizon.steps(CRAWL_LENGTH)) {
         return Ok(Reach { lasting: end, improved: end, commit: end, end });
     }
     let lasting = if whole {

@@ -25,7 +25,8 @@ use crate::job::machine::AxisLimits;
 use crate::tolerances::ROW_ARITHMETIC;
 use slow::{Transition, share};
 
-/// Cells of inner spans, and of those next to a rest: no fewer than any plan of this crate has.
+/// Cells of inner spans, and of those next to a rest: no fewer than any plan of this crate has. Spans that take no
+/// longer than half of what it takes to build up full acceleration have one, if that does for the old plan.
 const CELLS: u8 = 2;
 const REST_CELLS: u8 = 4;
 const REST_SPANS: usize = 4;
@@ -73,7 +74,10 @@ pub fn retime(
         return Err(RetimeError::Table);
     }
     let task = Task { table, knot, old, new, control_tick_s, relative_gap, deadline, unit };
-    let mut draft = task.draft();
+    let mut draft = task.draft(1);
+    if !task.keeps_old(&draft) {
+        draft = task.draft(CELLS);
+    }
     let mut iterations = 0;
     for _ in 0..MOST_DIVISIONS {
         let layout = draft.layout(&table.path);
@@ -84,7 +88,10 @@ pub fn retime(
                 None => return Ok(found),
             },
             // Long spans leave no room to slow down in.
-            Err(fault @ RetimeError::Unmet { .. }) => task.finer(&source, &draft.carried).ok_or(fault)?,
+            Err(fault @ RetimeError::Unmet { .. }) => match task.finer(&source, &draft.carried) {
+                Some(parts) => parts,
+                None => return task.as_it_is().ok_or(fault),
+            },
             Err(fault) => return Err(fault),
         };
         let refused = RetimeError::Format { u: layout.start(&table.path, knot) };
@@ -110,17 +117,46 @@ struct Task<'a> {
 
 impl<'a> Task<'a> {
     /// The spans of the table; those after the knot may be divided.
-    fn draft(&self) -> Draft {
+    fn draft(&self, fewest: u8) -> Draft {
         let n = self.table.spans();
         let mut knots = vec![0];
         for &step in &self.table.steps {
             knots.push(knots[knots.len() - 1] + u64::from(step));
         }
         let near_rest = |i: usize| i <= REST_SPANS || i + 1 + REST_SPANS >= n;
-        let cells = (0..n).map(|i| if near_rest(i) { REST_CELLS } else { CELLS }).collect();
+        let short = 0.5 * self.shortest_ramp();
+        let cells = (0..n)
+            .map(|i| match self.table.law(i).duration() {
+                _ if near_rest(i) => REST_CELLS,
+                seconds if seconds <= short => fewest,
+                _ => CELLS,
+            })
+            .collect();
         let inner = (1..n - 1).map(|i| self.table.control(i) / self.unit);
         let carried = std::iter::once(0.0).chain(inner).chain([0.0]).collect();
         Draft { knots, cells, carried, improved: n, lasting: n }
+    }
+
+    /// Whether the rows of the draft's cells admit the old plan under the old limits.
+    fn keeps_old(&self, draft: &Draft) -> bool {
+        let layout = draft.layout(&self.table.path);
+        let m = layout.unknowns();
+        let swept = vec![f64::INFINITY; m];
+        let mut work = Workspace::default();
+        let stretch = Stretch { from: self.knot, to: m };
+        work.load(
+            &self.source(self.old, &layout, &swept),
+            &draft.carried[1..=m],
+            &vec![0.0; m],
+            stretch,
+            |_| 0.0,
+        );
+        work.settle() >= -ROW_ARITHMETIC
+    }
+
+    /// Shortest time in which an axis builds up its full acceleration under the old limits [s].
+    fn shortest_ramp(&self) -> f64 {
+        self.old.limits.iter().map(|l| l.acceleration / l.jerk).fold(f64::INFINITY, f64::min)
     }
 
     fn problem<'s>(&'s self, rules: Rules<'s>) -> Problem<'s> {
@@ -172,6 +208,8 @@ impl<'a> Task<'a> {
         } else {
             let found = self.inside(&before, x, &half, &mut work).and_then(|(y, from)| {
                 half[self.knot..from].fill(0.0);
+                // The way down itself must not bend more than the format allows.
+                let before = RowSource { bends: true, ..before.clone() };
                 Transition { before: &before, after: &after, half: &half, from }.find(&y, &mut work)
             });
             if found.is_none() {
@@ -184,10 +222,15 @@ impl<'a> Task<'a> {
         let pinned = rounding::values(&after, &self.assemble(&after, &y));
         y[..from].copy_from_slice(&pinned[..from]);
         half[..from].fill(0.0);
-        work.load(&after, &y, &half, Stretch { from, to: m }, |_| 0.0);
-        if work.settle() > 0.0 {
-            *iterations += work.solve(self.relative_gap).iterations;
-            y[from..].copy_from_slice(&work.moved());
+        // Where the start bends no more than the format allows, neither will the answer.
+        for bends in [true, false] {
+            let source = RowSource { bends, ..after.clone() };
+            work.load(&source, &y, &half, Stretch { from, to: m }, |_| 0.0);
+            if work.settle() > 0.0 {
+                *iterations += work.solve(self.relative_gap).iterations;
+                y[from..].copy_from_slice(&work.moved());
+                break;
+            }
         }
         let table = self.assemble(&after, &y);
         let rounded = rounding::values(&after, &table);
@@ -256,14 +299,37 @@ impl<'a> Task<'a> {
         Retimed { table: self.table.clone(), holds_from: self.knot, holds_from_u: u, iterations: 0 }
     }
 
+    /// The old plan, from where it keeps the new limits anyway: on its way to rest it is slow in the end.
+    fn as_it_is(&self) -> Option<Retimed> {
+        let draft = self.draft(CELLS);
+        let layout = draft.layout(&self.table.path);
+        let m = layout.unknowns();
+        let (x, none) = (&draft.carried[1..=m], vec![0.0; m]);
+        let swept = vec![f64::INFINITY; m];
+        let after = self.source(self.new, &layout, &swept);
+        let mut work = Workspace::default();
+        let mut keeps = |j: usize| {
+            work.load(&after, x, &none, Stretch { from: j, to: m }, |_| 0.0);
+            work.settle() >= -ROW_ARITHMETIC
+        };
+        let (mut low, mut high) = (self.knot, m - 1);
+        if !keeps(high) {
+            return None;
+        }
+        while low < high {
+            let middle = (low + high) / 2;
+            if keeps(middle) { high = middle } else { low = middle + 1 }
+        }
+        let holds_from_u = layout.start(&self.table.path, high);
+        Some(Retimed { table: self.table.clone(), holds_from: high, holds_from_u, iterations: 0 })
+    }
+
     /// How to divide the spans after the knot that take longer than half of what it takes to build up full
     /// acceleration, as far as the motion may need to slow down. `None` where there is nothing to divide.
     fn finer(&self, source: &RowSource, x: &[f64]) -> Option<Vec<u32>> {
         let layout = source.layout;
-        let ramp = |l: &AxisLimits| l.acceleration / l.jerk;
-        let stop = |l: &AxisLimits| l.velocity / l.acceleration + ramp(l);
-        let shortest =
-            self.old.limits.iter().map(ramp).fold(f64::INFINITY, f64::min).max(4.0 * self.control_tick_s);
+        let stop = |l: &AxisLimits| l.velocity / l.acceleration + l.acceleration / l.jerk;
+        let shortest = self.shortest_ramp().max(4.0 * self.control_tick_s);
         let reach = SLOWING * self.old.limits.iter().map(stop).fold(0.0, f64::max);
         let mut clock = 0.0;
         let time = |i: usize| layout.h[i] / (x[i] * self.unit).sqrt();
