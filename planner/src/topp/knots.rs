@@ -111,14 +111,12 @@ fn graded_onwards(knots: &[u64]) -> Vec<u64> {
     let last = knots.len() - 1;
     let mut out = vec![knots[0], knots[1]];
     for (i, &end) in knots.iter().enumerate().skip(2) {
-        while i < last {
-            let (at, before) = (out[out.len() - 1], out[out.len() - 2]);
-            let most = MOST_UNEVEN.saturating_mul(at - before);
-            if end - at <= most {
-                break;
-            }
+        // The rest span at the end is one span, however long.
+        let most = |out: &[u64]| MOST_UNEVEN.saturating_mul(out[out.len() - 1] - out[out.len() - 2]);
+        while i != last && end - out[out.len() - 1] > most(&out) {
+            let at = out[out.len() - 1];
             // No sliver at the end.
-            out.push(at + most.min((end - at) / 2));
+            out.push(at + most(&out).min((end - at) / 2));
         }
         out.push(end);
     }
@@ -380,7 +378,7 @@ fn rest_lengths(problem: &Problem, sweep: &Sweep, ramp_s: &[f64]) -> ([f64; 2], 
             // matters, T is two ticks or a small share of the ramp.
             let t = (acceleration / jerk).max(0.05 * ramp_s[k]).max(2.0 * problem.control_tick_s);
             let needed = acceleration / t * t.min(LONGEST_S).powi(3) / 6.0;
-            if !(needed < length) || length < path.step {
+            if needed.is_nan() || needed >= length || length < path.step {
                 break jerk;
             }
             length = needed.max(0.5 * length);
