@@ -90,7 +90,7 @@ fn streamed(
 
 fn whole(path: &GridPath, limits: &[AxisLimits], caps: &[FeedCap]) -> f64 {
     let problem = Problem { path, limits, caps, control_tick_s: TICK_S };
-    let settings = Settings { windows: Windows::Whole, ..Settings::default() };
+    let settings = Settings { windows: Windows::Whole, largest_loss: f64::INFINITY, ..Settings::default() };
     planner::topp::plan(&problem, &settings).unwrap().table.duration()
 }
 

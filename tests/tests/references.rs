@@ -13,8 +13,6 @@ use std::process::Command;
 use planner::job::gcode::{Options, Program};
 use planner::job::machine::{LimitSet, Machine};
 use planner::job::program::{Item, MoveKind};
-use planner::topp::plan;
-use planner::topp::problem::{Problem, Settings};
 use tests::chain;
 use tests::oracle::cone::minimum_time;
 
@@ -24,9 +22,6 @@ const LONGER: f64 = 0.03;
 /// to so many times the limit.
 const FASTER: f64 = 0.01;
 const OVER: f64 = 1.05;
-
-/// Spans per ramp: on these paths the usual four leave several per cent.
-const FINE: f64 = 16.0;
 
 /// Spans of the reference take about so long, or a third of a span of the path [s].
 const PART_S: f64 = 2.5e-3;
@@ -49,25 +44,18 @@ fn compare(name: &str, program: &str) -> Result<(), String> {
     let options = Options { ignore_feed: true, ..Options::default() };
     let chain = chain::plan(program.as_bytes(), &machine, &options, LimitSet::VelocityAccelerationJerk)
         .unwrap_or_else(|e| panic!("{name}: {e}"));
-    let settings = Settings { spans_per_ramp: FINE, ..Settings::default() };
-    let (mut took, mut usual, mut least) = (0.0, 0.0, 0.0);
+    let (mut took, mut least) = (0.0, 0.0);
     for section in chain.plan.sections() {
-        let (path, limits) = (&section.table.path, &section.limits);
-        let problem = Problem { path, limits, caps: &[], control_tick_s: machine.control_tick_s };
-        let table = plan(&problem, &settings).unwrap_or_else(|e| panic!("{name}: {e}")).table;
-        for table in [&table, &section.table] {
-            assert!(table.codes.iter().all(|&c| c > 0), "{name}: q touches zero");
-        }
+        let (table, limits) = (&section.table, &section.limits);
+        let path = &table.path;
+        assert!(table.codes.iter().all(|&c| c > 0), "{name}: q touches zero");
         let longest = path.length() / (table.duration() / PART_S);
         let reference = minimum_time(path, limits, longest).expect("the reference is solved");
         assert!(reference.converged && reference.ratios.iter().all(|&r| r < OVER), "{name}: {reference:?}");
         took += table.duration();
-        usual += section.table.duration();
         least += reference.time;
     }
-    let over = |time: f64| 100.0 * (time / least - 1.0);
-    let text =
-        format!("{name}: {took:.4} s, {:+.2} % of {least:.4} s; as usual {:+.2} %", over(took), over(usual));
+    let text = format!("{name}: {took:.4} s, {:+.2} % of {least:.4} s", 100.0 * (took / least - 1.0));
     eprintln!("{text}");
     let near = ((1.0 - FASTER) * least..=(1.0 + LONGER) * least).contains(&took);
     if near { Ok(()) } else { Err(text) }

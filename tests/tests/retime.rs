@@ -18,7 +18,8 @@ const GAP: f64 = 1e-5;
 
 fn planned(path: &GridPath, rules: Rules) -> FeedTable {
     let problem = Problem { path, limits: rules.limits, caps: rules.caps, control_tick_s: TICK_S };
-    planner::topp::plan(&problem, &Settings::default()).unwrap().table
+    let settings = Settings { largest_loss: f64::INFINITY, ..Settings::default() };
+    planner::topp::plan(&problem, &settings).unwrap().table
 }
 
 fn again(table: &FeedTable, knot: usize, old: Rules, new: Rules) -> Result<Retimed, RetimeError> {

@@ -100,7 +100,8 @@ fn jerk_is_certified_between_the_samples() {
 fn rough_zigzags_do_not_stall() {
     let path = zigzag(&mut Rng::new(4), 60, 0.2);
     let p = planned(&path, &limits(2, 150.0, 1500.0, 5e4), &[]);
-    assert!(p.iterations < 40, "{}", p.iterations);
+    // Up to three solutions, the later ones on finer knots.
+    assert!(p.iterations < 3 * 30, "{}", p.iterations);
     let binds = |f: fn(&Binding) -> bool| p.binding.iter().filter(|b| f(b)).count();
     assert!(2 * binds(|b| matches!(b, Binding::Jerk(_))) > p.binding.len());
 }
