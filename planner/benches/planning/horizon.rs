@@ -81,7 +81,9 @@ pub(crate) fn retimed(c: &mut Criterion) {
         let (path, limits) = (paths::random_spline(axes, RETIMED), paths::limits(axes));
         let problem = Problem { path: &path, limits: &limits, caps: &[], control_tick_s: 1e-3 };
         let table =
-            planner::topp::plan(&problem, &Settings::default()).expect("a smooth path has a plan").table;
+            planner::topp::plan(&problem, &Settings { largest_loss: f64::INFINITY, ..Settings::default() })
+                .expect("a smooth path has a plan")
+                .table;
         let knot = table.spans() / 4;
         let old = Rules { limits: &limits, caps: &[] };
         let mut group = c.benchmark_group(format!("{axes} axes"));
@@ -113,7 +115,7 @@ pub(crate) fn divided(_: &mut Criterion) {
     let problem = Problem { path: &path, limits: &limits, caps: &[], control_tick_s: 1e-3 };
     let mut least = f64::INFINITY;
     for windows in [Windows::Whole, Windows::Overlap, Windows::Zhao] {
-        let settings = Settings { windows, ..Settings::default() };
+        let settings = Settings { windows, largest_loss: f64::INFINITY, ..Settings::default() };
         let begun = Instant::now();
         let plan = planner::topp::plan(&problem, &settings).expect("a smooth path has a plan");
         let took = begun.elapsed();
