@@ -30,11 +30,6 @@ pub(super) struct Start {
     pub(super) bends: bool,
 }
 
-/// The profile that bends as it likes.
-pub(super) fn profile(rows: &RowSource) -> Vec<f64> {
-    Profile::new(rows).plain()
-}
-
 /// Profiles to start from, the best first; the next one is for when no scale makes one feasible.
 pub(super) fn candidates(rows: &RowSource) -> Vec<Start> {
     let profile = Profile::new(rows);
