@@ -52,6 +52,16 @@ struct Codes {
     room: f64,
 }
 
+/// The rest spans of a motion.
+enum Rests {
+    /// They may be as they are.
+    Sound,
+    /// The codes are too coarse for them.
+    Coarse,
+    /// They have no parts, so that the motion next to them becomes another: shorter ones.
+    Divided(Result<Layout, PlanError>),
+}
+
 /// Why a motion is no plan.
 enum Unsound {
     /// A row is broken in this span; the knots on which it was tried.
@@ -85,9 +95,10 @@ impl Attempt<'_> {
             let mut room = rounding::halves(&source, scale, self.sweep);
             room.iter_mut().for_each(|half| *half *= codes.room);
             let Some((x, gap_s)) = self.optimise(&source, &room, iterations) else { continue };
-            let rests = self.rests(&source, &x);
-            if let Some(finer) = rests {
-                return finer.map(Solved::Divided);
+            match self.rests(&source, &x) {
+                Rests::Sound => {}
+                Rests::Coarse => continue,
+                Rests::Divided(finer) => return finer.map(Solved::Divided),
             }
             let shares: &[f64] = if codes.room == 1.0 { &SLOWER } else { &MUCH_SLOWER };
             let mut divided = None;
@@ -108,17 +119,22 @@ impl Attempt<'_> {
         Err(fault)
     }
 
-    /// Finer knots where a rest span would take too long: it has no parts, so the motion next to it becomes another.
-    fn rests(&self, source: &RowSource, x: &[f64]) -> Option<Result<Layout, PlanError>> {
+    /// What has to happen where a rest span would take too long.
+    fn rests(&self, source: &RowSource, x: &[f64]) -> Rests {
+        /// Smaller codes are too far apart to tell how long a rest span takes.
+        const LEAST_CODE: u32 = 8;
         let table = rounding::table(source, rounding::scale(source), x);
-        let parts = check::format(source.layout, &table)?;
-        let rest = |i: usize| i == 0 || i + 1 == parts.len();
-        if parts[0] == 1 && parts[parts.len() - 1] == 1 {
-            return None;
+        let Some(mut parts) = check::format(source.layout, &table) else { return Rests::Sound };
+        let last = parts.len() - 1;
+        if parts[0] == 1 && parts[last] == 1 {
+            return Rests::Sound;
         }
-        let parts: Vec<u32> = parts.iter().enumerate().map(|(i, &p)| if rest(i) { p } else { 1 }).collect();
+        if table.codes[0].min(table.codes[last - 2]) < LEAST_CODE {
+            return Rests::Coarse;
+        }
+        parts[1..last].fill(1);
         let finer = knots::refine(self.problem.path, source.layout, &parts);
-        Some(finer.map_err(|span| self.indivisible(source, &table, span)))
+        Rests::Divided(finer.map_err(|span| self.indivisible(source, &table, span)))
     }
 
     fn indivisible(&self, source: &RowSource, table: &FeedTable, span: usize) -> PlanError {
