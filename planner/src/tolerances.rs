@@ -97,3 +97,7 @@ pub const STALL_SLOPE: f64 = 1e-4;
 pub const LARGEST_LIMIT: f64 = 1e15;
 /// Smaller limits, and what is not a number, admit no motion.
 pub const SMALLEST_LIMIT: f64 = 1e-15;
+
+/// Range of every unit size in a table, of q the square root: keeps squares and cubes of any table far from overflow
+/// and underflow.
+pub const UNIT_SIZES: std::ops::RangeInclusive<f64> = 1e-15..=1e15;

@@ -75,3 +75,24 @@ fn slow_blocks_between_fast_ones() {
     holds(MILL, "G21 G90\nF15000\nG1 X60\nF50\nG1 X61\nF15000\nG1 X120\nM2\n");
     holds(MILL, "G21 G90\nF12\nG1 Z-0.2\nF1200\nG1 X0.50 Y0.25 Z0.11\nM2\n");
 }
+
+/// A feed so slow, met by fast ones, that speeds of one table lie four decades apart.
+#[test]
+fn feeds_four_decades_apart() {
+    holds(MILL, "G21 G90\nF15\nG1 X60\nF15000\nG1 X61\nM2\n");
+    holds(MILL, "G21 G90\nF15000\nG1 X60\nF15\nG1 X61\nF15000\nG1 X120\nM2\n");
+    holds(MILL, "G21 G90\nG93 G1 F0.05 X20\nG94 F15000\nG1 X60\nM2\n");
+    holds(MILL, "G21 G90\nG93 G1 F0.005 X20\nG94 F15000\nG1 X60\nM2\n");
+}
+
+/// A tenth of a micrometre in a second, between common feeds.
+#[test]
+fn a_second_for_next_to_nothing() {
+    holds(MILL, "G21 G90\nF20\nG1 Z198.75\nG93 G1 F60 Y-0.0001\nG94 F1200\nG1 X0.5 Y0.2499\nM2\n");
+}
+
+/// To and fro within the tolerance of a blend, after an exact path that ends there.
+#[test]
+fn to_and_fro_at_the_end_of_an_exact_path() {
+    holds(MILL, "G21 G90\nF20\nG61\nG1 X-300\nG64 P0.5\nG1 X-299.997\nG1 X-300\nG1 X-299.5\nM2\n");
+}

@@ -45,6 +45,18 @@ enum Word {
     Ci,
     /// Check that what docs/architecture.md and the README name exists
     Names,
+    /// Plan many random paths under random limits and check every plan
+    RandomPaths {
+        /// How many
+        #[arg(long, default_value_t = 10_000)]
+        count: u64,
+        /// Which
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// The first one looked at
+        #[arg(long, default_value_t = 0)]
+        from: u64,
+    },
     /// Run the release binary over a folder of part programs and print a table
     Real {
         /// The folder; sub-folders are searched, .gz files are unpacked with gzip
@@ -70,6 +82,7 @@ fn main() -> ExitCode {
             ("release build", &|| cargo(&root, &["build", "--release"])),
         ]),
         Word::Names => names::check(&root),
+        Word::RandomPaths { count, seed, from } => random_paths(&root, count, seed, from),
         Word::Real { dir, machine } => real::table(&root, &dir, machine.as_deref()),
     };
     match result {
@@ -95,6 +108,25 @@ fn lint(root: &Path) -> Step {
 fn bench(root: &Path, peers: bool) -> Step {
     cargo(root, &["bench", "--workspace", "--locked", "--bench", "*"])?;
     if peers { peers::run(root) } else { Ok(()) }
+}
+
+fn random_paths(root: &Path, count: u64, seed: u64, from: u64) -> Step {
+    let [count, seed, from] = [count, seed, from].map(|n| n.to_string());
+    shell::cargo_with(
+        root,
+        &[
+            "test",
+            "--release",
+            "--locked",
+            "--package",
+            "tests",
+            "--test",
+            "random_paths",
+            "--",
+            "--nocapture",
+        ],
+        &[("FEEDSPLINE_CASES", &count), ("FEEDSPLINE_SEED", &seed), ("FEEDSPLINE_FROM", &from)],
+    )
 }
 
 fn doc(root: &Path) -> Step {

@@ -5,9 +5,7 @@ use thiserror::Error;
 
 use crate::feed::table::{FeedTable, MIN_SPANS};
 use crate::job::machine::MAX_AXES;
-
-/// Range of every unit size in a table, of q the square root: keeps squares and cubes of any table far from overflow and underflow.
-const UNIT_SIZES: std::ops::RangeInclusive<f64> = 1e-15..=1e15;
+use crate::tolerances::UNIT_SIZES;
 
 /// Largest integer difference: exact in an f64.
 const EXACT: u64 = 1 << 53;

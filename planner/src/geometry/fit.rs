@@ -46,6 +46,9 @@ pub(super) enum Unfit {
     TooManySpans(usize),
 }
 
+/// More or finer spans than a section may have.
+struct TooMany;
+
 /// Most spans of one section.
 const MOST_SPANS: usize = 1 << 22;
 
@@ -62,6 +65,8 @@ pub(super) fn fit(contour: &Contour, demand: &Demand<'_>) -> Result<Spline, Unfi
     for pass in 0.. {
         let mut split = vec![false; fitter.knots.spans()];
         let plain = fitter.examine(&mut split, pass < QUIET_PASSES)?;
+        let first = split.iter().position(|&s| s).unwrap_or(0);
+        let open_u = fitter.knots.at[first] as f64 * fitter.knots.step;
         if pass >= QUIET_PASSES {
             widen(&mut split, 1usize.checked_shl(pass - QUIET_PASSES).unwrap_or(usize::MAX));
         }
@@ -71,7 +76,7 @@ pub(super) fn fit(contour: &Contour, demand: &Demand<'_>) -> Result<Spline, Unfi
             break;
         }
         if any {
-            fitter.halve(&split)?;
+            fitter.halve(&split).map_err(|TooMany| fitter.stuck(open_u))?;
         }
     }
     Ok(Spline { knots: fitter.knots, controls: fitter.controls })
@@ -380,21 +385,29 @@ impl<'a> Fitter<'a> {
         best
     }
 
+    /// What helps where no span is short enough: a stop at the nearest joint of primitives, if there is one.
+    fn stuck(&self, u: f64) -> Unfit {
+        let here = self.contour.seek(0, u);
+        let joints = [here, here + 1].into_iter().filter(|&k| k > 0 && k < self.contour.primitives.len());
+        let away = |k: &usize| (self.contour.start_of(*k) - u).abs();
+        let nearest = joints.min_by(|a, b| away(a).total_cmp(&away(b)));
+        nearest.map_or(Unfit::TooManySpans(here), Unfit::StopAt)
+    }
+
     /// Halves the marked spans and brings everything that depends on them up to date.
-    fn halve(&mut self, split: &[bool]) -> Result<(), Unfit> {
-        let stuck = (0..split.len()).find(|&i| split[i] && self.knots.length(i) < 2);
-        if let Some(i) = stuck {
+    fn halve(&mut self, split: &[bool]) -> Result<(), TooMany> {
+        let stuck = (0..split.len()).any(|i| split[i] && self.knots.length(i) < 2);
+        if stuck {
             self.knots.refine(FINER);
-            let here = self.contour.seek(0, self.knots.at[i] as f64 * self.knots.step);
             let finest = f64::from(*rules::STEP_EXPONENT.start()).exp2();
             if self.knots.step < finest || self.knots.at.last().is_some_and(|&end| end > MOST_STEPS) {
-                return Err(Unfit::TooManySpans(here));
+                return Err(TooMany);
             }
         }
         let origin = self.knots.halve(split);
         let spans = self.knots.spans();
         if spans > MOST_SPANS {
-            return Err(Unfit::TooManySpans(0));
+            return Err(TooMany);
         }
         let n = self.axes;
         let old_last = split.len() as isize;

@@ -221,7 +221,8 @@ impl Gather {
         let Some(tail) = self.tail.take() else { return };
         if distance(&tail.start, &tail.end) == 0.0 {
             // The figure came back to where it began: the path stays there, as far away as the figure reached.
-            match self.contour.primitives.last_mut() {
+            // That is within its own tolerance, which may be wider than that of the primitive before it.
+            match self.contour.primitives.last_mut().filter(|last| tail.ball <= MERGE * last.tolerance) {
                 Some(last) => last.slack = last.slack.max(tail.ball),
                 None => self.left_out = self.left_out.max(tail.ball),
             }

@@ -3,7 +3,7 @@
 use super::problem::Problem;
 use crate::geometry::section::SpeedCap;
 use crate::job::machine::{AxisLimits, MAX_AXES};
-use crate::tolerances::{LARGEST_LIMIT, SMALLEST_LIMIT};
+use crate::tolerances::{LARGEST_LIMIT, SMALLEST_LIMIT, UNIT_SIZES};
 
 /// A limit of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -152,8 +152,8 @@ pub enum PlanError {
 /// What is wrong with a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PathFault {
-    /// The grid step is not a positive number.
-    #[error("its grid step is not positive")]
+    /// The grid step is not a positive number of a sensible size.
+    #[error("its grid step is not between 1e-15 and 1e15")]
     Step,
     /// The knots do not rise from zero.
     #[error("its knots do not rise from zero")]
@@ -161,8 +161,8 @@ pub enum PathFault {
     /// An axis has the wrong number of control points.
     #[error("an axis has too few or too many control points")]
     Controls,
-    /// The resolution of an axis is not a positive number.
-    #[error("the resolution of an axis is not positive")]
+    /// The resolution of an axis is not a positive number of a sensible size.
+    #[error("the resolution of an axis is not between 1e-15 and 1e15")]
     Resolution,
     /// Control points lie so far apart that their differences overflow.
     #[error("its control points are out of range")]
@@ -236,7 +236,7 @@ pub(super) fn validate_limits(limits: &[AxisLimits], axes: usize) -> Result<(), 
 fn validate_path(problem: &Problem) -> Result<(), PlanError> {
     let path = problem.path;
     let fault = |what| Err(PlanError::Path { what });
-    if !(path.step > 0.0 && path.step.is_finite()) {
+    if !UNIT_SIZES.contains(&path.step) {
         return fault(PathFault::Step);
     }
     let rising = path.breaks.windows(2).all(|w| w[0] < w[1]);
@@ -247,7 +247,7 @@ fn validate_path(problem: &Problem) -> Result<(), PlanError> {
         if a.controls.len() != path.breaks.len() + 2 {
             return fault(PathFault::Controls);
         }
-        if !(a.lsb > 0.0 && a.lsb.is_finite()) {
+        if !UNIT_SIZES.contains(&a.lsb) {
             return fault(PathFault::Resolution);
         }
         if a.controls.iter().any(|c| c.unsigned_abs() > 1 << 53) {

@@ -138,7 +138,7 @@ fn hard_breaks(problem: &Problem, estimate: &Estimate) -> Vec<u64> {
     let breaks = &path.breaks;
     let snap = |wanted: f64, geometry: u64| {
         let most = (total / 12).clamp(1, geometry);
-        let steps = (wanted / path.step).clamp(1.0, most as f64) as u64;
+        let steps = (wanted / path.step).min(LONGEST_STEP).clamp(1.0, most as f64) as u64;
         // No sliver between the rest span and the next geometry knot.
         if steps < geometry && geometry - steps < steps / 2 { (geometry / 2).max(1) } else { steps }
     };
@@ -290,8 +290,9 @@ impl<'a> Estimate<'a> {
     /// Pieces for the part [a, b] of one geometry span.
     fn pieces(&self, a: u64, b: u64, largest_code: f64) -> u64 {
         let wanted = (self.at(&self.count, b) - self.at(&self.count, a) - 1e-6).ceil().max(1.0);
+        let fewest = ((b - a) as f64 / LONGEST_STEP).ceil() as u64;
         let most = self.time(a, b) / self.shortest_s(a, largest_code);
-        (wanted.min(most.max(1.0)) as u64).clamp(1, b - a)
+        (wanted.min(most.max(1.0)) as u64).max(fewest).clamp(1, b - a)
     }
 
     /// Appends the knots after `a` up to `b`, `pieces` of them, at equal shares of the count.

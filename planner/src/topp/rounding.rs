@@ -5,6 +5,7 @@ use super::rows::RowSource;
 use super::sweep::Sweep;
 use crate::feed::table::FeedTable;
 use crate::job::machine::{AxisLimits, MAX_AXES};
+use crate::tolerances::UNIT_SIZES;
 
 /// Largest code of a table that 16 bits serve.
 pub(super) const SHORT_CODE: f64 = 65535.0;
@@ -13,14 +14,15 @@ pub(super) const LONG_CODE: f64 = 4_194_303.0;
 /// Relative error of a value computed by the drive in f32: the square's conversion and one product.
 const SINGLE: f64 = 1.3e-7;
 
-/// Size of a squared code such that control values up to `ceiling` V^2 have a code.
+/// Size of a squared code such that control values up to `ceiling` V^2 have a code, and the table's unit is sound.
 pub(super) fn scale(rows: &RowSource) -> f32 {
     scale_of(rows.unit * rows.ceiling, rows.largest_code)
 }
 
 /// Size of a squared code such that q up to `top` has a code.
 pub(super) fn scale_of(top: f64, largest_code: f64) -> f32 {
-    let exact = top / (largest_code * largest_code);
+    let least = UNIT_SIZES.start().powi(2);
+    let exact = (top / (largest_code * largest_code)).max(least);
     let single = exact as f32;
     if f64::from(single) < exact { single.next_up() } else { single }
 }

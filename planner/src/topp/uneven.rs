@@ -26,8 +26,9 @@ pub(super) fn parts(
     settings: &Settings,
     layout: &Layout,
     table: &FeedTable,
-    step: f64,
 ) -> Option<Vec<u32>> {
+    // du/dt of the smallest code.
+    let step = f64::from(table.q_scale).sqrt();
     let n = layout.spans();
     let spans: Vec<Span> = spans(problem, layout, table, step).collect();
     let uneven = |i: usize| {

@@ -3,10 +3,11 @@
 use planner::geometry::grid_path::GridPath;
 use planner::geometry::section::{FeedCap, SpeedCap};
 use planner::job::machine::AxisLimits;
+use planner::tolerances::UNIT_SIZES;
 use tests::oracle::sweep::swept_time;
 
 use crate::chance::Chance;
-use crate::paths::{Shape, path, shape};
+use crate::paths::{Shape, path, shape, steepest};
 
 /// Longest motion [s], and the most times that the quickest axis could build up its acceleration.
 const LONGEST_S: f64 = 100.0;
@@ -69,9 +70,10 @@ fn finer(case: &Case) -> Option<u32> {
     const FROM_REST_S: f64 = 0.2;
     const AT_SPEED_S: f64 = 0.05;
     let Case { path, limits, caps, tick_s, .. } = case;
+    let slope = steepest(path).max(1.0);
     let of_axis = |l: &AxisLimits| {
         let from_rest = (l.jerk * FROM_REST_S.powi(3) / 6.0).min(l.acceleration * FROM_REST_S.powi(2) / 2.0);
-        from_rest.min(l.velocity * AT_SPEED_S)
+        from_rest.min(l.velocity * AT_SPEED_S) / slope
     };
     let of_cap = |c: &FeedCap| match c.speed {
         SpeedCap::None => f64::INFINITY,
@@ -83,7 +85,8 @@ fn finer(case: &Case) -> Option<u32> {
     };
     let longest = limits.iter().map(of_axis).chain(caps.iter().map(of_cap)).fold(path.step, f64::min);
     let finer = (path.step / longest).log2().ceil() as u32;
-    (path.length() / path.step * f64::from(finer).exp2() < 2f64.powi(50)).then_some(finer)
+    let steps = path.length() / path.step * f64::from(finer).exp2();
+    (steps < 2f64.powi(50) && longest > 2.0 * UNIT_SIZES.start()).then_some(finer)
 }
 
 /// Velocities over six decades, times to reach them and full acceleration over three decades each; alike for all

@@ -12,11 +12,11 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
 
 use case::Case;
 use planner::certificate::certify;
-use planner::tolerances::CERTIFICATE_RATIO;
+use planner::feed::table::SpanLaw;
+use planner::tolerances::{CERTIFICATE_RATIO, TABLE_SERIES_ARGUMENT};
 use planner::topp::problem::{Problem, Settings};
 use planner::topp::{PlanError, plan};
 use tests::oracle::dense::largest_ratios;
@@ -55,54 +55,27 @@ fn kind(error: &PlanError) -> &'static str {
 fn check(case: &Case) -> Result<(), Finding> {
     let Case { path, limits, caps, tick_s, .. } = case;
     let problem = Problem { path, limits, caps, control_tick_s: *tick_s };
-    let begin = Instant::now();
-    if std::env::var("SHOW").is_ok() {
-        println!(
-            "SHOW {} {} {} {:?} {:?} tick {tick_s} sweep {}",
-            path.spans(),
-            path.step,
-            path.length(),
-            limits,
-            caps,
-            swept_time(path, limits, caps, 64)
-        );
-        for a in &path.axes {
-            println!(
-                "AXIS {:?}",
-                a.controls.iter().rev().take(5).map(|&c| c as f64 * a.lsb).collect::<Vec<_>>()
-            );
-        }
-    }
     let plan = match plan(&problem, &Settings::default()) {
         Ok(plan) => plan,
         Err(e) => return found(kind(&e), e.to_string()),
     };
-    if std::env::var("TELL").is_ok() {
-        println!(
-            "{:?} plan s {} spans {} geo {} seconds {} iterations {} tick {} limits {:?} length {} caps {}",
-            case.shape,
-            begin.elapsed().as_secs_f64(),
-            plan.table.spans(),
-            path.spans(),
-            plan.table.duration(),
-            plan.iterations,
-            tick_s,
-            limits,
-            path.length(),
-            caps.len()
-        );
-    }
     let proof = certify(&plan.table, limits, caps);
-    if std::env::var("TELL").is_ok() {
-        println!(
-            "proven {} {:?} {:?}",
-            begin.elapsed().as_secs_f64(),
-            proof,
-            largest_ratios(&plan.table, limits, caps, 50)
-        );
-    }
     if !proof.holds {
         return found("certificate", format!("{proof:?}"));
+    }
+    for span in 0..plan.table.spans() {
+        let law = plan.table.law(span);
+        let seconds = law.duration();
+        let bend = match law {
+            SpanLaw::Quadratic { h, q: [alpha, beta, gamma] } => {
+                let end = alpha + h * (beta + h * gamma);
+                gamma * (h / (alpha.sqrt() + end.sqrt())).powi(2)
+            }
+            SpanLaw::Launch { .. } | SpanLaw::Landing { .. } => 0.0,
+        };
+        if !(seconds > 0.0 && seconds < 1.0 && bend.abs() <= TABLE_SERIES_ARGUMENT) {
+            return found("format", format!("span {span} takes {seconds} s and bends by {bend}"));
+        }
     }
     let sampled = largest_ratios(&plan.table, limits, caps, SAMPLES);
     let pairs = [
@@ -117,9 +90,11 @@ fn check(case: &Case) -> Result<(), Finding> {
     if !pairs.iter().all(sound) {
         return found("samples", format!("{sampled:?} above {proof:?}"));
     }
-    let (seconds, least) = (plan.table.duration(), swept_time(path, limits, caps, 64));
-    if !(seconds.is_finite() && seconds >= least * (1.0 - SWEEP)) {
-        return found("sweep", format!("{seconds} s against {least} s at least"));
+    // Many stations where few are too inaccurate.
+    let seconds = plan.table.duration();
+    let undercut = |stations: usize| seconds < swept_time(path, limits, caps, stations) * (1.0 - SWEEP);
+    if !seconds.is_finite() || (undercut(64) && undercut(2048)) {
+        return found("sweep", format!("{seconds} s is less than a motion without jerk takes"));
     }
     Ok(())
 }
@@ -139,7 +114,7 @@ fn setting(name: &str, default: u64) -> u64 {
 
 #[test]
 fn random_paths_hold() {
-    let (cases, from) = (setting("FEEDSPLINE_CASES", 60), setting("FEEDSPLINE_FROM", 0));
+    let (cases, from) = (setting("FEEDSPLINE_CASES", 300), setting("FEEDSPLINE_FROM", 0));
     let seed = setting("FEEDSPLINE_SEED", 1);
     let findings: Mutex<BTreeMap<&str, u64>> = Mutex::default();
     let next = AtomicU64::new(from);
@@ -153,14 +128,9 @@ fn random_paths_hold() {
                         break;
                     }
                     let case = Case::of(seed, number);
-                    let begin = Instant::now();
-                    let outcome = outcome(&case);
-                    let seconds = begin.elapsed().as_secs_f64();
-                    if let Err(Finding { kind, text }) = outcome {
-                        println!("case {number}, {:?}, {seconds:.1} s: {kind}: {text}", case.shape);
+                    if let Err(Finding { kind, text }) = outcome(&case) {
+                        println!("case {number}, {:?}: {kind}: {text}", case.shape);
                         *findings.lock().unwrap().entry(kind).or_default() += 1;
-                    } else if seconds > 10.0 {
-                        println!("case {number}, {:?}: {seconds:.1} s to plan", case.shape);
                     }
                 }
             });

@@ -106,6 +106,16 @@ fn greville(breaks: &[u64]) -> Vec<f64> {
     (0..last + 3).map(|i| (knot(i - 2) + knot(i - 1) + knot(i)) / 3.0).collect()
 }
 
+/// Largest slope of the control polygons: no axis is steeper.
+pub(crate) fn steepest(path: &GridPath) -> f64 {
+    let nodes = greville(&path.breaks);
+    let slopes = path.axes.iter().flat_map(|axis| {
+        let legs = nodes.windows(2).zip(axis.controls.windows(2));
+        legs.map(|(u, c)| c[1].abs_diff(c[0]) as f64 * axis.lsb / ((u[1] - u[0]) * path.step))
+    });
+    slopes.fold(0.0, f64::max)
+}
+
 fn unit(chance: &mut Chance, axes: usize) -> Vec<f64> {
     let mut d: Vec<f64> = (0..axes).map(|_| chance.within(-1.0, 1.0)).collect();
     normalise(&mut d);
