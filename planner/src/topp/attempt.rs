@@ -22,8 +22,8 @@ const MUCH_SLOWER: [f64; 12] = [1.0, 0.9999, 0.999, 0.99, 0.97, 0.93, 0.85, 0.7,
 
 /// What became of a solution.
 pub(super) enum Solved {
-    /// It is a plan.
-    Plan(Plan),
+    /// It is a plan, on these knots.
+    Plan(Plan, Layout),
     /// It has to be found anew on finer knots.
     Divided(Layout),
 }
@@ -109,7 +109,7 @@ impl Attempt<'_> {
             let mut divided = None;
             for share in shares {
                 match self.sound(&source, x.iter().map(|x| x * share).collect()) {
-                    Ok(plan) => return Ok(Solved::Plan(Plan { gap_s, ..plan })),
+                    Ok((plan, knots)) => return Ok(Solved::Plan(Plan { gap_s, ..plan }, knots)),
                     Err(Unsound::Row(span, knots)) => {
                         fault = PlanError::Resolution { span, u: knots.start(self.problem.path, span) };
                         divided = divided.or(Some(knots).filter(|k| k.spans() > layout.spans()));
@@ -147,8 +147,8 @@ impl Attempt<'_> {
         if seconds >= 1.0 { PlanError::Slow { span, u, seconds } } else { PlanError::Uneven { span, u } }
     }
 
-    /// The plan that `x` stands for, on knots added where the format asks for them.
-    fn sound(&self, source: &RowSource, mut x: Vec<f64>) -> Result<Plan, Unsound> {
+    /// The plan that `x` stands for, on knots added where the format asks for them, and these knots.
+    fn sound(&self, source: &RowSource, mut x: Vec<f64>) -> Result<(Plan, Layout), Unsound> {
         let mut layout = source.layout.clone();
         let mut source = source.clone();
         for _ in 0..MOST_DIVISIONS {
@@ -160,12 +160,8 @@ impl Attempt<'_> {
                 let half = rounding::halves(&here, scale, self.sweep);
                 let findings = check::rows(&here, &rounding::values(&here, &table), &half);
                 if findings.worst <= 1.0 + ROW_ARITHMETIC {
-                    return Ok(Plan {
-                        table,
-                        binding: findings.binding,
-                        iterations: 0,
-                        gap_s: f64::INFINITY,
-                    });
+                    let plan = Plan { table, binding: findings.binding, iterations: 0, gap_s: f64::INFINITY };
+                    return Ok((plan, layout));
                 }
                 return Err(Unsound::Row(findings.span, layout));
             };

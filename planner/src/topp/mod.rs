@@ -65,25 +65,22 @@ fn plan_whole_up_to(whole: usize, problem: &Problem, settings: &Settings) -> Res
     let (mut coarse, mut rounds): (Option<Plan>, usize) = (None, 0);
     for _ in 0..MOST_SOLUTIONS {
         match attempt.solve(&layout, largest_code, &mut iterations) {
-            Ok(Solved::Plan(plan)) => {
+            Ok(Solved::Plan(plan, knots)) => {
                 let seconds = plan.table.duration();
                 let before = coarse.as_ref().map_or(f64::INFINITY, |plan| plan.table.duration());
                 if seconds >= before * (1.0 - settings.largest_loss) {
                     coarse = if seconds < before { Some(plan) } else { coarse };
                     break;
                 }
-                let parts = if rounds < MOST_ROUNDS && plan.table.spans() == layout.spans() {
-                    uneven::parts(problem, settings, &layout, &plan.table)
-                } else {
-                    None
-                };
+                let parts = (rounds < MOST_ROUNDS)
+                    .then(|| uneven::parts(problem, settings, &knots, &plan.table))
+                    .flatten();
                 coarse = Some(plan);
-                let Some(Ok(finer)) = parts.map(|parts| knots::refine(problem.path, &layout, &parts)) else {
+                let Some(Ok(finer)) = parts.map(|parts| knots::refine(problem.path, &knots, &parts)) else {
                     break;
                 };
                 layout = finer;
                 rounds += 1;
-                continue;
             }
             Ok(Solved::Divided(finer)) => layout = finer,
             Err(e) => match coarse {
