@@ -14,7 +14,7 @@ use crate::geometry::section::Section;
 use crate::geometry::sections::SectionItem;
 use crate::job::machine::{AxisLimits, LimitSet, Machine};
 use crate::topp::problem::{Binding, Problem, Settings};
-use crate::topp::{self, PlanError};
+use crate::topp::{self, PlanError, Relief};
 
 /// Sections that may wait between the geometry and the planner.
 const WAITING: usize = 256;
@@ -60,6 +60,8 @@ pub enum JobError<E> {
         line: u32,
         /// Why.
         fault: PlanError,
+        /// The smallest relaxation of a single limit that would give it a plan, where there is one.
+        relief: Option<Relief>,
     },
 }
 
@@ -194,8 +196,11 @@ fn plan_section<E>(
         caps: &section.marks.caps,
         control_tick_s: machine.control_tick_s,
     };
-    let plan = topp::plan(&problem, settings)
-        .map_err(|fault| JobError::Plan { line: line_of(&fault, &section), fault })?;
+    let plan = topp::plan(&problem, settings).map_err(|fault| JobError::Plan {
+        line: line_of(&fault, &section),
+        fault,
+        relief: topp::relief(&problem, settings, &fault),
+    })?;
     let Section { kind, marks, .. } = section;
     let certificate = certify(&plan.table, &limits, &marks.caps);
     let section = PlannedSection { kind, limits, table: plan.table, marks };

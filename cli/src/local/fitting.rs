@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use planner::job::machine::{LimitSet, Machine};
 use planner::pipeline::{self, JobError, JobPlan};
-use planner::topp::PlanError;
 use planner::topp::problem::{JerkForm, Settings, Solver, Windows};
+use planner::topp::{PlanError, Relaxed, Relief};
 
 use super::job::{self, Told, placed};
 use crate::args::{self, Jerk, JobArgs, PlanArgs};
@@ -51,7 +51,13 @@ pub(super) fn plan(args: &PlanArgs, progress: &mut Progress) -> Result<Fitted, F
         })
         .map_err(|e| match e {
             JobError::Section(failure) => failure,
-            JobError::Plan { line, fault } => unplannable(&args.job, line, &fault),
+            JobError::Plan { line, fault, relief } => {
+                let failure = unplannable(&args.job, line, &fault);
+                match relief {
+                    Some(relief) => failure.with_help(relaxation(&relief, &machine)),
+                    None => failure,
+                }
+            }
         })
     })?;
     Ok(Fitted { machine, plan, told, jerk, seconds: begin.elapsed().as_secs_f64() })
@@ -88,6 +94,30 @@ fn settings(args: &PlanArgs, jerk: Jerk) -> Settings {
 pub(super) fn unplannable(args: &JobArgs, line: u32, fault: &PlanError) -> Failure {
     let help = if args.way_points() { POINTS_REMEDY } else { remedy(fault) };
     placed(fault.to_string(), &args.file, Some(line), None).with_help(help)
+}
+
+/// Which limit has to give way, and how far.
+fn relaxation(relief: &Relief, machine: &Machine) -> String {
+    let what = match relief.limit {
+        Relaxed::Feed => "feed".to_owned(),
+        Relaxed::Axis(axis, kind) => {
+            let name = machine.axes.get(axis).map_or("?", |axis| axis.name.as_str());
+            format!("{kind} limit of axis {name}")
+        }
+    };
+    format!(
+        "Raise the {what} to {} times what it is: of all changes of a single limit this is the smallest with which the \
+         motion can be planned.",
+        rounded_up(relief.factor)
+    )
+}
+
+/// A number above 1 with three digits, none of which is too small.
+fn rounded_up(factor: f64) -> f64 {
+    let unit = 10f64.powf(factor.log10().floor() - 2.0);
+    let digits = if unit < 1.0 { -unit.log10().round() } else { 0.0 };
+    let tens = 10f64.powf(digits);
+    ((factor / unit).ceil() * unit * tens).round() / tens
 }
 
 /// What to do about a section that cannot be planned.
@@ -134,4 +164,18 @@ fn line_count(file: &Path) -> usize {
         reader.consume(used);
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rounded_up;
+
+    #[test]
+    fn factors_are_rounded_up_to_three_digits() {
+        for (factor, shown) in
+            [(1.001, "1.01"), (2.3, "2.3"), (2.301, "2.31"), (99.91, "100"), (1234.0, "1240")]
+        {
+            assert_eq!(rounded_up(factor).to_string(), shown);
+        }
+    }
 }

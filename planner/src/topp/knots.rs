@@ -24,10 +24,16 @@ const MOST_UNEVEN: u64 = 4;
 /// Longest step of a table [grid steps].
 const LONGEST_STEP: f64 = (1u64 << 31) as f64;
 /// Most spans of one table: beyond, memory would not do.
-const MOST_SPANS: f64 = 2e7;
+pub(super) const MOST_SPANS: f64 = 2e7;
 /// Inner spans next to a rest, and the cells each of them gets.
 const REST_SPANS: usize = 4;
 const REST_CELLS: u8 = 4;
+
+/// How many spans a valid problem is expected to take.
+pub(super) fn expected(problem: &Problem, settings: &Settings, sweep: &Sweep) -> f64 {
+    let estimate = Estimate::new(problem, settings, sweep);
+    estimate.count[estimate.count.len() - 1]
+}
 
 /// Places the knots of a valid problem by the speed the sweep allows, and chooses the largest code.
 pub(super) fn place(

@@ -15,6 +15,7 @@ mod knots;
 mod lanes;
 mod layout;
 pub mod problem;
+mod relief;
 mod rest;
 pub mod retime;
 mod rounding;
@@ -28,6 +29,7 @@ mod window;
 mod zhao;
 
 pub use error::{LimitKind, PathFault, PlanError};
+pub use relief::{Relaxed, Relief, relief};
 
 use crate::job::machine::AxisLimits;
 use crate::tolerances::LARGEST_LIMIT;

@@ -10,7 +10,7 @@ use self::families::{Rng, cap, circle, limits, line, walk, zigzag};
 use self::oracle::{Oracle, certified_jerk};
 use super::problem::{Binding, Plan, Problem, Settings, Solver};
 use super::sweep::Sweep;
-use super::{LimitKind, PlanError, plan};
+use super::{LimitKind, PlanError, Relaxed, plan, relief};
 use crate::geometry::grid_path::GridPath;
 use crate::geometry::section::{FeedCap, SpeedCap};
 use crate::job::machine::AxisLimits;
@@ -215,6 +215,32 @@ fn bad_problems_are_refused_by_name() {
     let mut torn = path.clone();
     torn.breaks = vec![0, 9, 9];
     assert!(matches!(refused(&torn, &good, &[]), PlanError::Path { .. }));
+}
+
+#[test]
+fn refusals_name_the_smallest_relaxation() {
+    let path = line(&[0.6, 0.8], 10.0, 3);
+    let settings = Settings::default();
+    let ask = |l: &[AxisLimits], caps: &[FeedCap]| {
+        let problem = Problem { path: &path, limits: l, caps, control_tick_s: TICK_S };
+        relief(&problem, &settings, &plan(&problem, &settings).unwrap_err())
+    };
+    let good = limits(2, 100.0, 500.0, 1e4);
+    let capped = |factor: f64| cap(&path, SpeedCap::Rate(1e-9 * factor));
+    let found = ask(&good, &capped(1.0)).unwrap();
+    assert_eq!(found.limit, Relaxed::Feed);
+    assert!(ask(&good, &capped(0.9 * found.factor)).is_some_and(|left| left.factor < 1.2), "{found:?}");
+    let crawling = |factor: f64| {
+        let mut l = good.clone();
+        l[1].velocity = 1e-9 * factor;
+        l
+    };
+    let found = ask(&crawling(1.0), &[]).unwrap();
+    assert_eq!(found.limit, Relaxed::Axis(1, LimitKind::Velocity));
+    assert!(ask(&crawling(0.9 * found.factor), &[]).is_some_and(|left| left.factor < 1.2), "{found:?}");
+    // No limit helps a path without length.
+    let problem = Problem { path: &path, limits: &good, caps: &[], control_tick_s: TICK_S };
+    assert_eq!(relief(&problem, &settings, &PlanError::NothingMoves), None);
 }
 
 proptest! {
