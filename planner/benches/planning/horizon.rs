@@ -91,7 +91,7 @@ pub(crate) fn retimed(c: &mut Criterion) {
             let mut other = limits.to_vec();
             other.iter_mut().for_each(|l| l.velocity *= factor);
             let new = Rules { limits: &other, caps: &[] };
-            let again = || retime(black_box(&table), knot, old, new, 1e-3, 1e-5, Deadline::NONE);
+            let again = || retime(black_box(&table), knot, old, new, 1e-3, 5e-5, Deadline::NONE);
             let found = again().expect("the motion can change its speed");
             eprintln!(
                 "{axes} axes, {} of {} spans planned anew for {factor} times the speed: {:.4} s, was {:.4} s, holds from \

@@ -40,11 +40,11 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// Interior point, a gap of 1e-5 of the time, four spans per ramp and more where they save 0.1 % of the time.
+    /// Interior point, a gap of 5e-5 of the time, four spans per ramp and more where they save 0.1 % of the time.
     fn default() -> Self {
         Settings {
             solver: Solver::InteriorPoint,
-            relative_gap: 1e-5,
+            relative_gap: 5e-5,
             spans_per_ramp: 4.0,
             largest_loss: 1e-3,
             jerk: JerkForm::True,

@@ -52,7 +52,7 @@ impl Default for HorizonSettings {
         HorizonSettings {
             lookahead: 2.5,
             advance: 2.5,
-            relative_gap: 1e-5,
+            relative_gap: 5e-5,
             spans_per_ramp: 4.0,
             headroom: 2.0,
         }

@@ -22,6 +22,13 @@ const TO_BOUNDARY: f64 = 0.98;
 const MOST_LOSS: f64 = 0.9;
 /// Least barrier reduction per iteration.
 const LEAST_CENTRING: f64 = 1e-5;
+/// Least gap to begin with, as a share of the time: a start that lies at its limits looks better than it is, and would
+/// stay there for many iterations.
+const LEAST_START: f64 = 0.4;
+/// Gap, in wanted gaps, within which iterations that gain next to nothing end the run, and what next to nothing is, in
+/// wanted gaps too.
+const NEARLY: f64 = 10.0;
+const NO_GAIN: f64 = 0.1;
 /// Most iterations; runs end after 13 to 30.
 const MOST_ITERATIONS: u32 = 80;
 /// Least slack a start is scaled down to.
@@ -186,12 +193,14 @@ impl Workspace {
         let [lo, hi] = self.free;
         self.best.clone_from(&self.c);
         let (mut best_time, mut last_time) = (f64::INFINITY, f64::INFINITY);
+        let mut idle = 0;
         let mut dual_step = 0.0;
         let rows = self.rows.count();
         self.band.reset(n);
         let time = self.time();
         let balance = -(lo..hi).map(|j| self.gradient[j] * self.c[j]).sum::<f64>();
         let mu = balance / self.rows.push_back(&self.c).max(f64::MIN_POSITIVE);
+        let mu = mu.max(LEAST_START * time / rows);
         let mut run = Run { iterations: 0, gap: time };
         if !(mu.is_finite() && mu > 0.0) {
             return run;
@@ -204,6 +213,8 @@ impl Workspace {
             self.push.clear();
             self.push.resize(n, 0.0);
             let gap = self.rows.normal(&self.c, dual_step, &mut self.band, &mut self.push);
+            let wanted = relative_gap * time;
+            idle = if gap < NEARLY * wanted && time > best_time - NO_GAIN * wanted { idle + 1 } else { 0 };
             if time < best_time {
                 best_time = time;
                 run.gap = gap;
@@ -212,7 +223,7 @@ impl Workspace {
             if self.deadline.passed(iteration) {
                 return run;
             }
-            if gap < relative_gap * time && (time - last_time).abs() < relative_gap * time {
+            if idle == 2 || (gap < wanted && (time - last_time).abs() < wanted) {
                 return run;
             }
             last_time = time;

@@ -32,6 +32,8 @@ const REST_CELLS: u8 = 4;
 const REST_SPANS: usize = 4;
 /// Shares by which the old plan is drawn down, as they are tried, over as many spans.
 const DRAWN: [(f64, usize); 4] = [(0.1, 20), (0.03, 12), (0.01, 12), (3e-3, 30)];
+/// Spans on which a place to begin is looked at first.
+const FIRST_SPANS: usize = 3;
 /// Spans that the old plan is followed at most for the sake of slack.
 const MOST_FOLLOWED: usize = 160;
 /// How much of the motion may be divided for the sake of slowing down, in times from full speed to rest, and into how
@@ -266,19 +268,21 @@ impl<'a> Task<'a> {
         work: &mut Workspace,
     ) -> Option<(Vec<f64>, usize)> {
         let m = x.len();
+        let mut half = half.to_vec();
+        half[..self.knot].fill(0.0);
+        let mut holds = |y: &[f64], half: &[f64], from: usize, spans: usize| {
+            work.load(source, y, half, Stretch { from, to: m.min(from + spans) }, |_| 0.0);
+            work.settle() > 0.0
+        };
         for from in self.knot..m.min(self.knot + MOST_FOLLOWED) {
-            let mut half = half.to_vec();
-            half[..from].fill(0.0);
+            if from > 0 {
+                half[from - 1] = 0.0;
+            }
             for (drawn, spans) in DRAWN {
                 let begins = |j: usize| if j < from { 0.0 } else { share(j + 1, from, from + spans) };
                 let y: Vec<f64> = x.iter().enumerate().map(|(j, x)| x * (1.0 - drawn * begins(j))).collect();
-                let near = Stretch { from, to: m.min(from + spans + 4) };
-                work.load(source, &y, &half, near, |_| 0.0);
-                if work.settle() <= 0.0 {
-                    continue;
-                }
-                work.load(source, &y, &half, Stretch { from, to: m }, |_| 0.0);
-                if work.settle() > 0.0 {
+                // Where there is no slack, it is missing at the beginning in most cases.
+                if [FIRST_SPANS, spans + 4, m].into_iter().all(|spans| holds(&y, &half, from, spans)) {
                     return Some((y, from));
                 }
             }
