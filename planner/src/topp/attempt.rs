@@ -71,11 +71,13 @@ enum Unsound {
 }
 
 impl Attempt<'_> {
-    /// Solves on given knots, rounds and checks. Codes become finer where rounding alone breaks a limit.
+    /// Solves on given knots, rounds and checks. Codes become finer where rounding alone breaks a limit; unless it
+    /// `may_divide`, a motion that needs more knots than these is slowed until it holds on them.
     pub(super) fn solve(
         &self,
         layout: &Layout,
         largest_code: f64,
+        may_divide: bool,
         iterations: &mut u64,
     ) -> Result<Solved, PlanError> {
         let unit = self.sweep.top();
@@ -117,7 +119,7 @@ impl Attempt<'_> {
                     Err(Unsound::Indivisible(e)) => fault = e,
                 }
             }
-            if let Some(finer) = divided.filter(|_| codes.room == 1.0) {
+            if let Some(finer) = divided.filter(|_| codes.room == 1.0 && may_divide) {
                 return Ok(Solved::Divided(finer));
             }
         }

@@ -65,8 +65,8 @@ fn plan_whole_up_to(whole: usize, problem: &Problem, settings: &Settings) -> Res
     let mut iterations = 0;
     // What coarser knots give.
     let (mut coarse, mut rounds): (Option<Plan>, usize) = (None, 0);
-    for _ in 0..MOST_SOLUTIONS {
-        match attempt.solve(&layout, largest_code, &mut iterations) {
+    for left in (0..MOST_SOLUTIONS).rev() {
+        match attempt.solve(&layout, largest_code, left > 0, &mut iterations) {
             Ok(Solved::Plan(plan, knots)) => {
                 let seconds = plan.table.duration();
                 let before = coarse.as_ref().map_or(f64::INFINITY, |plan| plan.table.duration());
