@@ -89,7 +89,8 @@ pub struct JobArgs {
     /// Folder for the results; out/ and the job's name without it
     #[arg(long, short, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Path tolerance, instead of the program's and the machine's
+    /// Path tolerance, instead of the program's and the machine's; of way-points, instead of their last digit or a drive
+    /// count: 0 takes the path through every one of them
     #[arg(long, value_name = "MM", value_parser = tolerance, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
     /// Ignore programmed feeds: only the machine limits the speed
@@ -128,21 +129,17 @@ impl JobArgs {
             ("--knots", self.knots.is_some()),
             ("--feed", self.feed.is_some()),
         ];
-        let for_programs = [
-            ("--tolerance", self.tolerance.is_some()),
-            ("--ignore-feed", self.ignore_feed),
-            ("--dialect", self.dialect.is_some()),
-        ];
-        let given = |options: [(&'static str, bool); 3]| options.into_iter().find(|o| o.1).map(|o| o.0);
+        let for_programs = [("--ignore-feed", self.ignore_feed), ("--dialect", self.dialect.is_some())];
+        let given = |options: &[(&'static str, bool)]| options.iter().find(|o| o.1).map(|o| o.0);
         let (option, kind, help) = if self.way_points() {
             (
-                given(for_programs),
+                given(&for_programs),
                 "a file of way-points",
-                "The path runs through the way-points themselves. Leave the option away.",
+                "Only part programs have feeds and words to be read. Leave the option away.",
             )
         } else {
             (
-                given(for_points),
+                given(&for_points),
                 "a part program",
                 "Files of way-points end in .csv. Leave the option away, or rename the file if it is one.",
             )

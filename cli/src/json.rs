@@ -106,6 +106,8 @@ pub struct WayPointsJson {
     pub ends: String,
     /// How its parameter is spread: `uniform`, `chord` or `centripetal`.
     pub knots: String,
+    /// Of how many spans it consists: fewer than way-points lie between where the tolerance allows it.
+    pub geometry_spans: u64,
 }
 
 /// One axis.

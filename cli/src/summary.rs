@@ -5,14 +5,15 @@ use crate::json::{
     VerifyJson,
 };
 use crate::report::compare::{change, seconds};
-use crate::report::words::{bytes, count, duration, length, percent, times};
+use crate::report::words::{bytes, count, duration, length, percent, small, times};
 
 /// The summary of `plan` and `run`.
 pub fn plan(p: &PlanJson) -> String {
     let mut s = Sheet::new(&format!("{} on {}", p.job, p.machine));
     if let Some(points) = &p.way_points {
         let (ends, knots) = (&points.ends, &points.knots);
-        s.row("way-points", &format!("{}, {ends} spline, {knots} knots", count(points.count)));
+        let (points, spans) = (count(points.count), count(points.geometry_spans));
+        s.row("way-points", &format!("{points}, {ends} spline in {spans} spans, {knots} knots"));
     } else {
         s.row("program", &blocks(p));
     }
@@ -26,7 +27,8 @@ pub fn plan(p: &PlanJson) -> String {
         s.row(name, &format!("{} ({} as long)", duration(stop), times(gain)));
     }
     let (bound, allowed) = (p.max_deviation_mm, p.tolerance_mm);
-    s.row("deviation", &format!("{bound:.4} mm of {allowed} mm allowed ({})", p.tolerance_source));
+    let [bound, allowed] = [bound, allowed].map(small);
+    s.row("deviation", &format!("{bound} mm of {allowed} mm allowed ({})", p.tolerance_source));
     let per_second = p.table_bytes as f64 / p.motion_time_s.max(f64::MIN_POSITIVE);
     let rate = if p.motion_time_s > 0.0 { format!(", {per_second:.0} B/s") } else { String::new() };
     s.row("table", &format!("{} in {} spans{rate}", bytes(p.table_bytes), count(p.spans)));

@@ -299,7 +299,7 @@ fn options_that_do_not_fit_the_job() {
     fs::write(home.path().join("part.ngc"), "G21 G1 X5 F100\n").unwrap();
     for verb in ["plan", "run", "compare"] {
         for (file, words) in [
-            ("points.csv", &["--tolerance", "0.1"][..]),
+            ("points.csv", &["--ignore-feed"][..]),
             ("points.csv", &["--dialect", "printer"]),
             ("points.csv", &["--ignore-feed"]),
             ("part.ngc", &["--spline", "natural"]),

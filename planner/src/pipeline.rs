@@ -13,7 +13,7 @@ use crate::feed::job::{JobItem, PlannedSection};
 use crate::geometry::section::Section;
 use crate::geometry::sections::SectionItem;
 use crate::job::machine::{AxisLimits, LimitSet, Machine};
-use crate::topp::problem::{Binding, Problem, Settings};
+use crate::topp::problem::{Binding, JerkForm, Problem, Settings};
 use crate::topp::{self, PlanError, Relief};
 
 /// Sections that may wait between the geometry and the planner.
@@ -204,7 +204,11 @@ fn plan_section<E>(
     let Section { kind, marks, .. } = section;
     let certificate = certify(&plan.table, &limits, &marks.caps);
     let section = PlannedSection { kind, limits, table: plan.table, marks };
-    let binding = rulings(&section);
+    // Pseudo-jerk is stricter than the limit that the table is read against: the solver's rows tell.
+    let binding = match settings.jerk {
+        JerkForm::True => rulings(&section),
+        JerkForm::Pseudo => plan.binding,
+    };
     let (iterations, gap_s) = (plan.iterations, plan.gap_s);
     Ok(Planned::Section { section, certificate, binding, iterations, gap_s })
 }

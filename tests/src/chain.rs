@@ -45,7 +45,7 @@ pub fn plan(
     let mut stream = sections(seen, machine, &PathSettings::of(machine, limits));
     let plan = pipeline::plan(&mut stream, machine, limits, &Settings::default(), &mut |_| ())?;
     drop(stream);
-    let mut comparison = Comparison::new(&machine.axes);
+    let mut comparison = Comparison::new(&machine.axes, limits);
     for item in &items {
         match item {
             Item::Move(m) => comparison.add(m),

@@ -97,7 +97,7 @@ fn options_of_the_other_kind_of_job_are_refused() {
         assert!(check(&["a.ngc", option, value]).unwrap_err().contains(option), "{option}");
         assert!(check(&["csv", option, value]).is_err(), "{option}");
     }
-    for words in [&["--tolerance", "0.1"][..], &["--dialect", "rs274"], &["--ignore-feed"]] {
+    for words in [&["--dialect", "rs274"][..], &["--ignore-feed"]] {
         assert!(check(&[&["a.ngc"], words].concat()).is_ok(), "{words:?}");
         assert!(check(&[&["a.csv"], words].concat()).unwrap_err().contains(words[0]), "{words:?}");
     }

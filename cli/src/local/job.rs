@@ -46,12 +46,14 @@ pub(super) struct Points {
     pub(super) count: usize,
     pub(super) ends: Ends,
     pub(super) knots: Knots,
+    pub(super) geometry_spans: usize,
 }
 
 impl Points {
     pub(super) fn json(&self) -> WayPointsJson {
         let (ends, knots) = (args::name(self.ends), args::name(self.knots));
-        WayPointsJson { count: self.count as u64, ends, knots }
+        let geometry_spans = self.geometry_spans as u64;
+        WayPointsJson { count: self.count as u64, ends, knots, geometry_spans }
     }
 }
 
@@ -69,6 +71,7 @@ impl InForce {
             Some(ToleranceSource::Program) => "program",
             Some(ToleranceSource::CommandLine) => "command line",
             Some(ToleranceSource::BestSpeed) => "machine, for G64 without P",
+            Some(ToleranceSource::Resolution) => "resolution of the way-points",
             Some(ToleranceSource::Machine) | None => "machine",
         }
     }
@@ -100,9 +103,9 @@ pub(super) fn read<R>(
     args.check()?;
     let settings = PathSettings::of(machine, limits);
     if args.way_points() {
-        points::read(args, machine, &settings, consume)
+        points::read(args, machine, limits, &settings, consume)
     } else {
-        program::read(args, machine, &settings, consume)
+        program::read(args, machine, limits, &settings, consume)
     }
 }
 

@@ -8,7 +8,7 @@ use planner::analysis::comparison::Comparison;
 use planner::analysis::steady::arc_length;
 use planner::geometry::sections::{PathSettings, SectionError, SectionItem, sections};
 use planner::job::gcode::{BoundingBox, Counters};
-use planner::job::machine::{Machine, Point};
+use planner::job::machine::{LimitSet, Machine, Point};
 use planner::job::program::{Corner, Feed, Item, Move, MoveKind, Shape, StopCause, ToleranceSource};
 use planner::job::waypoints::{self, SplineForm, WayPointError, WayPoints};
 use planner::splines::cubic::Ends;
@@ -26,18 +26,23 @@ use crate::failure::Failure;
 pub(super) fn read<R>(
     args: &JobArgs,
     machine: &Machine,
+    limits: LimitSet,
     settings: &PathSettings,
     consume: impl FnOnce(Stream<'_>) -> Result<R, Failure>,
 ) -> Result<(R, Told), Failure> {
     let refused =
         |e: WayPointError| placed(e.kind().to_string(), &args.file, e.line(), e.column()).quoting(e);
     let points = waypoints::read(&args.file, machine).map_err(refused)?;
-    let form = form(args, &points);
+    let tolerance = match args.tolerance {
+        Some(mm) => InForce { mm, source: Some(ToleranceSource::CommandLine) },
+        None => InForce { mm: points.resolution_mm(), source: Some(ToleranceSource::Resolution) },
+    };
+    let form = SplineForm { tolerance_mm: tolerance.mm, ..form(args, &points) };
     let feed = args.feed.map(|per_minute| per_minute / 60.0);
     let spline = points.section(&form, feed).map_err(refused)?;
-    let mut told = tell(&points, feed, machine);
+    let mut told = tell(&points, feed, Comparison::new(&machine.axes, limits), tolerance);
     let (ends, knots) = (args.spline.unwrap_or_default(), args.knots.unwrap_or_default());
-    told.points = Some(Points { count: points.count(), ends, knots });
+    told.points = Some(Points { count: points.count(), ends, knots, geometry_spans: spline.path.spans() });
     told.counters.feed_length_mm = arc_length(&spline.path, points.counted());
 
     let approach = approach(&points);
@@ -79,8 +84,7 @@ fn approach(points: &WayPoints<'_>) -> Option<Move> {
 }
 
 /// Counts and measures of the way-points, each chord taken for a block.
-fn tell(points: &WayPoints<'_>, feed: Option<f64>, machine: &Machine) -> Told {
-    let mut comparison = Comparison::new(&machine.axes);
+fn tell(points: &WayPoints<'_>, feed: Option<f64>, mut comparison: Comparison, tolerance: InForce) -> Told {
     let mut whole = BoundingBox { min: points.point(0), max: points.point(0) };
     let mut start = points.point(0);
     for i in 1..points.count() {
@@ -101,7 +105,7 @@ fn tell(points: &WayPoints<'_>, feed: Option<f64>, machine: &Machine) -> Told {
         counters: Counters { bounding_box: Some(whole), ..Counters::default() },
         comparison,
         stops: BTreeMap::from([(StopCause::ProgramEnd, 1)]),
-        tolerance: InForce { mm: machine.tolerance_mm, source: Some(ToleranceSource::Machine) },
+        tolerance,
         left_out_mm: 0.0,
         points: None,
     }
@@ -123,5 +127,6 @@ fn form(args: &JobArgs, points: &WayPoints<'_>) -> SplineForm {
         },
         knots,
         end_slopes: points.end_chords(knots),
+        ..SplineForm::default()
     }
 }

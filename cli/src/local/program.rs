@@ -3,7 +3,7 @@
 use planner::analysis::comparison::Comparison;
 use planner::geometry::sections::{PathSettings, SectionError, sections};
 use planner::job::gcode::{self, Options, ProgramError};
-use planner::job::machine::Machine;
+use planner::job::machine::{LimitSet, Machine};
 use planner::job::program::{Corner, Item, MoveKind, ToleranceSource};
 
 use super::job::{InForce, Stream, Told, placed};
@@ -17,12 +17,13 @@ use crate::failure::Failure;
 pub(super) fn read<R>(
     args: &JobArgs,
     machine: &Machine,
+    limits: LimitSet,
     settings: &PathSettings,
     consume: impl FnOnce(Stream<'_>) -> Result<R, Failure>,
 ) -> Result<(R, Told), Failure> {
     let refused = |e: ProgramError| placed(e.kind().to_string(), &args.file, e.line(), e.column()).quoting(e);
     let mut program = gcode::open(&args.file, machine, options(args)).map_err(refused)?;
-    let mut comparison = Comparison::new(&machine.axes);
+    let mut comparison = Comparison::new(&machine.axes, limits);
     let mut tolerance = InForce::default();
     let items = program.by_ref().inspect(|item| match item {
         Ok(Item::Move(m)) => {

@@ -6,7 +6,7 @@ use planner::tolerances::FEED_REACHED;
 use super::colour;
 use super::data::speed_unit;
 use super::model::{DriveEnd, Report};
-use super::words::{bytes, count, duration, number, percent, times};
+use super::words::{bytes, count, duration, number, percent, small, times};
 
 /// Who, what, on what.
 pub(super) fn header(report: &Report) -> Markup {
@@ -77,8 +77,8 @@ pub(super) fn headline(report: &Report) -> Markup {
             ))
             (card(
                 if report.way_points.is_some() { "Deviation from the way-points" } else { "Deviation from the program" },
-                &format!("\u{2264} {} mm", number(tolerance.deviation_mm)),
-                &format!("{} mm allowed by the {}", number(tolerance.tolerance_mm), tolerance.source),
+                &format!("\u{2264} {} mm", small(tolerance.deviation_mm)),
+                &format!("{} mm allowed by the {}", small(tolerance.tolerance_mm), tolerance.source),
                 if tolerance.deviation_mm <= tolerance.tolerance_mm { "good" } else { "bad" },
             ))
             (card("Feed table", &bytes(table.total()), &table_more, ""))

@@ -6,7 +6,7 @@ use planner::analysis::shortfall::Shortfall;
 use super::colour;
 use super::data::{PINS, speed_unit};
 use super::model::{Bounds, Limit, Report};
-use super::words::{aligned, bytes, count, duration, length, number, percent};
+use super::words::{aligned, bytes, count, duration, length, number, percent, small};
 
 /// Stands where there is nothing to say.
 const NOTHING: &str = "\u{2013}";
@@ -138,10 +138,10 @@ pub(super) fn proof(report: &Report) -> Markup {
                 }
             } }
             p {
-                "The path is nowhere further than " b { (number(tolerance.deviation_mm)) " mm" }
+                "The path is nowhere further than " b { (small(tolerance.deviation_mm)) " mm" }
                 @if report.way_points.is_some() { " from the way-points" } @else { " from the programmed contour" }
                 " (line " (tolerance.line) "); "
-                (number(tolerance.tolerance_mm)) " mm are allowed, set by the " (tolerance.source) "."
+                (small(tolerance.tolerance_mm)) " mm are allowed, set by the " (tolerance.source) "."
             }
             @if let Some(sim) = &report.simulation {
                 h3 { "End state of the simulated drives" }

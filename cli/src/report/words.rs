@@ -39,6 +39,17 @@ pub fn length(mm: f64) -> String {
     }
 }
 
+/// A bound that may be far below one, rounded up to two digits: `0.0043`, `0.000071`, `2.5`.
+pub fn small(value: f64) -> String {
+    if !(value > 0.0 && value.is_finite()) {
+        return number(value);
+    }
+    let decimals = (1.0 - value.log10().floor()).clamp(0.0, 17.0);
+    let scale = 10f64.powf(decimals);
+    let shown = (value * scale * (1.0 - 1e-12)).ceil() / scale;
+    format!("{shown:.*}", decimals as usize).trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
 /// A size: `912 B`, `34.1 kB`, `2.10 MB`.
 pub fn bytes(n: u64) -> String {
     match n {
@@ -97,6 +108,12 @@ pub fn aligned(value: f64, largest: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn small_bounds_are_rounded_up() {
+        let shown = [0.0, 0.0000412, 0.00025, 0.02, 2.51, 4.0e-16].map(small);
+        assert_eq!(shown, ["0", "0.000042", "0.00025", "0.02", "2.6", "0.0000000000000004"]);
+    }
 
     #[test]
     fn counts_are_grouped_from_the_right() {

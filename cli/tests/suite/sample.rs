@@ -494,7 +494,12 @@ pub(crate) fn compared() -> Compared {
         json: CompareJson {
             job: "jobs/points.csv".into(),
             job_kind: "way-points",
-            way_points: Some(WayPointsJson { count: 3000, ends: "not-a-knot".into(), knots: "chord".into() }),
+            way_points: Some(WayPointsJson {
+                count: 3000,
+                ends: "not-a-knot".into(),
+                knots: "chord".into(),
+                geometry_spans: 900,
+            }),
             machine: report.machine.clone(),
             axes: report
                 .axes

@@ -222,7 +222,7 @@ fn field_names_of_compare_and_sample_are_pinned() {
                     iterations jerk_form jerk_ratio lost_s method over_whole remark solver spans state \
                     traverse_time_s velocity_ratio windows";
     assert_eq!(keys(&compare["methods"][0]), expected.split_whitespace().collect::<Vec<_>>());
-    assert_eq!(keys(&compare["way_points"]), ["count", "ends", "knots"]);
+    assert_eq!(keys(&compare["way_points"]), ["count", "ends", "geometry_spans", "knots"]);
     assert_eq!(keys(&compare["files"]), ["compare", "report"]);
     let states: Vec<&Value> =
         compare["methods"].as_array().unwrap().iter().map(|method| &method["state"]).collect();

@@ -1,7 +1,7 @@
 //! What the same moves would take at constant feed, and when every block starts and ends at rest.
 
 use super::double_s::double_s_rest_time;
-use crate::job::machine::{Axis, AxisKind, AxisLimits, MAX_AXES, Point};
+use crate::job::machine::{Axis, AxisKind, AxisLimits, LimitSet, MAX_AXES, Point};
 use crate::job::program::{Feed, Move, MoveKind, Shape};
 
 /// Accumulates the two times as moves pass.
@@ -11,7 +11,7 @@ pub struct Comparison {
     kinds: Vec<AxisKind>,
     /// If every move ran at its programmed feed (rapids at the axes' velocities) without acceleration limits [s].
     pub constant_feed_time_s: f64,
-    /// If every block started and ended at rest, each under a double-S profile within the axis limits [s].
+    /// If every block started and ended at rest, each under a double-S profile within the axis limits that count [s].
     ///
     /// Arcs are granted full acceleration along and across the path at once, so this is a lower estimate.
     pub stop_at_every_block_time_s: f64,
@@ -30,10 +30,11 @@ struct Along {
 }
 
 impl Comparison {
-    /// For a machine with these axes.
-    pub fn new(axes: &[Axis]) -> Self {
+    /// For a machine with these axes, under the limits that count.
+    pub fn new(axes: &[Axis], limits: LimitSet) -> Self {
+        let of = |axis| [MoveKind::Feed, MoveKind::Rapid].map(|kind| limits.of(axis, kind));
         Self {
-            limits: axes.iter().map(|a| [a.limits, a.rapid]).collect(),
+            limits: axes.iter().map(of).collect(),
             kinds: axes.iter().map(|a| a.kind).collect(),
             constant_feed_time_s: 0.0,
             stop_at_every_block_time_s: 0.0,
@@ -136,7 +137,7 @@ mod tests {
     }
 
     fn times(m: &Move) -> (f64, f64) {
-        let mut c = Comparison::new(&machine());
+        let mut c = Comparison::new(&machine(), LimitSet::VelocityAccelerationJerk);
         c.add(m);
         (c.constant_feed_time_s, c.stop_at_every_block_time_s)
     }
@@ -179,7 +180,7 @@ mod tests {
             };
             Move { shape: Shape::Arc(a), ..line(&[0.0, 0.0, rise], Some(Feed::Speed(90.0))) }
         };
-        let mut c = Comparison::new(&machine());
+        let mut c = Comparison::new(&machine(), LimitSet::VelocityAccelerationJerk);
         c.add(&arc(5.0, 0.0));
         assert!((c.feed_length - 10.0 * PI).abs() < 1e-12);
         // sqrt(A R) = 50, below the feed; the jerk bound (J R^2)^(1/3) = 63 is above it.

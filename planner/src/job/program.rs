@@ -122,6 +122,8 @@ pub enum ToleranceSource {
     CommandLine,
     /// G64 without P: the machine's best-speed tolerance.
     BestSpeed,
+    /// Way-points: their last digit, or a drive count.
+    Resolution,
 }
 
 /// Why motion comes to rest.

@@ -5,8 +5,9 @@
 //! and lines that start with `#` are skipped. Axes without a column stay at 0, where programs start.
 //!
 //! The path passes every way-point to half a drive count or better, in order, from rest at the first to rest at
-//! the last. Give digits freely: where way-points are h apart, an error e in them shakes the machine with a
-//! jerk of about 6 e (v/h)^3.
+//! the last, unless a tolerance lets it pass some of them nearby. Where way-points are h apart, an error e in them, the
+//! last digit or a drive count, shakes the machine with a jerk of about 6 e (v/h)^3: a spline through fewer of them is as
+//! close to them all and smooth.
 //!
 //! Two neighbouring way-points in the same place are refused, for any knots. A path that turns back on itself
 //! is not: the spline is smooth in its parameter there, and motion passes the turn with all axes at
@@ -25,6 +26,7 @@ use crate::tolerances::ZERO_LENGTH;
 mod error;
 mod fit;
 mod reader;
+mod thin;
 
 pub use error::{WayPointError, WayPointErrorKind};
 
@@ -43,6 +45,8 @@ pub struct WayPoints<'m> {
     values: Vec<f64>,
     /// Line of the file of each way-point, from 1.
     lines: Vec<u32>,
+    /// The last digit with which each column is written, in axis units.
+    digits: Vec<f64>,
 }
 
 /// How the spline runs through the way-points.
@@ -54,12 +58,19 @@ pub struct SplineForm {
     pub knots: Knots,
     /// dr/du at the start and the end, in axis units per unit of path length; for clamped ends only.
     pub end_slopes: [Point; 2],
+    /// How far way-points may lie from the spline so that fewer of them become knots [mm]; 0: all do.
+    pub tolerance_mm: f64,
 }
 
 impl Default for SplineForm {
     /// Not-a-knot ends on chord lengths; zero slopes if the ends are then clamped.
     fn default() -> Self {
-        Self { ends: Ends::NotAKnot, knots: Knots::Chord, end_slopes: [Point::default(); 2] }
+        Self {
+            ends: Ends::NotAKnot,
+            knots: Knots::Chord,
+            end_slopes: [Point::default(); 2],
+            tolerance_mm: 0.0,
+        }
     }
 }
 
@@ -168,6 +179,34 @@ impl<'m> WayPoints<'m> {
         })
     }
 
+    /// Resolution of the way-points [mm]: the largest drive count or last digit of any axis, the latter as far as it is
+    /// below a tenth of the machine's tolerance.
+    pub fn resolution_mm(&self) -> f64 {
+        /// Where fewer digits are written than the tolerance has, they are the whole position.
+        const MOST: f64 = 0.1;
+        let units = self.axes.iter().zip(&self.digits).map(|(&axis, &digit)| {
+            let axis = &self.machine.axes[axis];
+            let (tolerance, scale) = match axis.kind {
+                AxisKind::Linear => (self.machine.tolerance_mm, 1.0),
+                AxisKind::Rotary => (self.machine.tolerance_rotary, self.rotary_scale()),
+            };
+            digit.min(MOST * tolerance).max(1.0 / axis.counts_per_unit) * scale
+        });
+        units.fold(0.0, f64::max)
+    }
+
+    /// The same job with only these way-points.
+    fn only(&self, kept: &[usize]) -> Self {
+        Self {
+            machine: self.machine,
+            name: self.name.clone(),
+            axes: self.axes.clone(),
+            values: kept.iter().flat_map(|&i| self.row(i)).copied().collect(),
+            lines: kept.iter().map(|&i| self.lines[i]).collect(),
+            digits: self.digits.clone(),
+        }
+    }
+
     fn row(&self, i: usize) -> &[f64] {
         &self.values[i * self.axes.len()..(i + 1) * self.axes.len()]
     }
@@ -175,8 +214,8 @@ impl<'m> WayPoints<'m> {
     /// The path through the way-points as a section that starts and ends at rest, with the programmed `feed` in
     /// axis units per second as its only cap.
     ///
-    /// The deviation is the proven distance of the rounded path from the way-points. Its tolerance is the
-    /// machine's, or half a count on every axis where that is coarser.
+    /// The deviation is the proven distance of the rounded path from the way-points. Its tolerance is the form's, or
+    /// half a count on every axis where that is coarser.
     ///
     /// # Errors
     /// If there are too few way-points for the end condition, a closed curve does not close, or the spline
@@ -221,7 +260,15 @@ struct Collector<'m>(WayPoints<'m>);
 
 impl<'m> Collector<'m> {
     fn new(name: &str, machine: &'m Machine, axes: Vec<usize>) -> Self {
-        Self(WayPoints { machine, name: name.to_owned(), axes, values: Vec::new(), lines: Vec::new() })
+        let digits = vec![0.0; axes.len()];
+        Self(WayPoints {
+            machine,
+            name: name.to_owned(),
+            axes,
+            values: Vec::new(),
+            lines: Vec::new(),
+            digits,
+        })
     }
 
     fn push(&mut self, row: &[f64], line: u32) -> Result<(), WayPointError> {

@@ -1,7 +1,7 @@
 //! From way-points to a section: knots, spline, rounding, and the checks of the rounded path.
 
 use super::WayPointErrorKind as Kind;
-use super::{SplineForm, WayPointError, WayPoints};
+use super::{SplineForm, WayPointError, WayPoints, thin};
 use crate::geometry::grid_path::{GridAxis, GridPath};
 use crate::geometry::section::{BlockMark, Deviation, FeedCap, Marks, Section, SpeedCap};
 use crate::job::machine::{Axis, AxisKind};
@@ -33,12 +33,13 @@ const FINEST_STEP: f64 = 1.0 / (1u64 << 48) as f64;
 const FINEST_SHARE: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// The way-points' spline in the making.
-struct Fit<'a> {
-    points: &'a WayPoints<'a>,
-    form: &'a SplineForm,
-    weights: Vec<f64>,
-    /// Weighted distances between neighbouring way-points.
-    distances: Vec<f64>,
+pub(super) struct Fit<'a> {
+    /// Those that the spline passes.
+    pub(super) points: &'a WayPoints<'a>,
+    pub(super) form: &'a SplineForm,
+    weights: &'a [f64],
+    /// Parameter lengths between them.
+    lengths: Vec<f64>,
 }
 
 pub(super) fn section(
@@ -47,13 +48,17 @@ pub(super) fn section(
     feed: Option<f64>,
 ) -> Result<Section, WayPointError> {
     let weights = points.weights();
-    let distances = points.distances(&weights);
-    let fit = Fit { points, form, weights, distances };
-    fit.check_request(feed)?;
+    let lengths = form.knots.lengths(&points.distances(&weights));
+    let all = Fit { points, form, weights: &weights, lengths };
+    all.check_request(feed)?;
+    let kept = thin::kept(&all, &all.lengths, form.tolerance_mm);
+    let lengths = kept.windows(2).map(|w| all.lengths[w[0]..w[1]].iter().sum()).collect();
+    let fit = Fit { points: &points.only(&kept), form, weights: &weights, lengths };
     let grid = fit.grid();
     let (path, breaks) = fit.path(&grid)?;
     fit.check_progress(&path, &breaks)?;
-    let deviation = fit.deviation(&path, &grid);
+    let places = places(&all.lengths, &kept, &grid);
+    let deviation = all.deviation(&path, &places);
     let end = path.grid_length();
     let marks = Marks {
         caps: vec![FeedCap {
@@ -61,17 +66,40 @@ pub(super) fn section(
             speed: feed
                 .map_or(SpeedCap::None, |speed| SpeedCap::Tangential { axes: points.counted(), speed }),
         }],
-        blocks: grid
-            .at
-            .iter()
-            .zip(&points.lines)
-            .skip(1)
-            .map(|(&until, &line)| BlockMark { until, line })
-            .collect(),
+        blocks: blocks(points, &places, &grid),
         deviation,
         end: StopCause::ProgramEnd,
     };
     Ok(Section { kind: MoveKind::Feed, path, marks })
+}
+
+/// Places of all way-points on the grid of those kept [grid steps].
+fn places(lengths: &[f64], kept: &[usize], grid: &KnotGrid) -> Vec<f64> {
+    let mut places = vec![0.0];
+    for (w, at) in kept.windows(2).zip(grid.at.windows(2)) {
+        let inside = &lengths[w[0]..w[1]];
+        let scale = (at[1] - at[0]) as f64 / inside.iter().sum::<f64>();
+        let mut x = 0.0;
+        for h in &inside[..inside.len() - 1] {
+            x += h;
+            places.push(at[0] as f64 + x * scale);
+        }
+        places.push(at[1] as f64);
+    }
+    places
+}
+
+/// Which line every part of the path comes from: the way to the way-point there.
+fn blocks(points: &WayPoints<'_>, places: &[f64], grid: &KnotGrid) -> Vec<BlockMark> {
+    let end = grid.at[grid.at.len() - 1];
+    let mut blocks: Vec<BlockMark> = Vec::with_capacity(places.len());
+    for (place, &line) in places.iter().zip(&points.lines).skip(1) {
+        let until = (place.round() as u64).min(end);
+        if blocks.last().map_or(0, |b| b.until) < until {
+            blocks.push(BlockMark { until, line });
+        }
+    }
+    blocks
 }
 
 impl Fit<'_> {
@@ -79,7 +107,7 @@ impl Fit<'_> {
         &self.points.machine.axes[self.points.axes[column]]
     }
 
-    fn columns(&self) -> std::ops::Range<usize> {
+    pub(super) fn columns(&self) -> std::ops::Range<usize> {
         0..self.points.axes.len()
     }
 
@@ -123,11 +151,11 @@ impl Fit<'_> {
     /// path, a sixteenth of the shortest interval and of the shortest rest span, and a 64th of the way of one
     /// control tick at full speed.
     fn grid(&self) -> KnotGrid {
-        let lengths = self.form.knots.lengths(&self.distances);
+        let lengths = &self.lengths;
         let total: f64 = lengths.iter().sum();
         let shortest = lengths.iter().fold(f64::INFINITY, |m, &h| m.min(h));
         let mut wanted = COARSEST_STEP.min(total / 1024.0).min(shortest / 16.0);
-        for (column, weight) in self.columns().zip(&self.weights) {
+        for (column, weight) in self.columns().zip(self.weights) {
             let limits = self.axis(column).limits;
             wanted = wanted.min(weight * limits.velocity * self.points.machine.control_tick_s / 64.0);
             if limits.jerk.is_finite() {
@@ -137,7 +165,7 @@ impl Fit<'_> {
             }
         }
         let step = power_of_two_below(wanted.max(total * FINEST_SHARE).max(FINEST_STEP));
-        KnotGrid::new(&lengths, step)
+        KnotGrid::new(lengths, step)
     }
 
     /// The positions that the spline of a column takes: the ends on whole counts, so that motion rests there
@@ -271,7 +299,7 @@ impl Fit<'_> {
     fn check_progress(&self, path: &GridPath, breaks: &[Break]) -> Result<(), WayPointError> {
         for (span, start) in breaks.iter().enumerate().take(path.spans()) {
             let mut squares = [0.0; 3];
-            for (&index, weight) in self.points.axes.iter().zip(&self.weights) {
+            for (&index, weight) in self.points.axes.iter().zip(self.weights) {
                 let (_, b) = path.bezier(index, span);
                 for (j, square) in squares.iter_mut().enumerate() {
                     *square += (3.0 * weight * (b[j + 1] - b[j])).powi(2);
@@ -286,30 +314,67 @@ impl Fit<'_> {
         Ok(())
     }
 
-    /// Largest distance of the rounded path from a way-point, measured at the way-point's knot.
-    fn deviation(&self, path: &GridPath, grid: &KnotGrid) -> Deviation {
-        let size = |linear: f64, rotary: f64| linear.sqrt().max(rotary.sqrt() * self.points.rotary_scale());
-        let (mut bound_mm, mut line) = (0.0, self.points.lines[0]);
-        let mut span = 0;
-        for (i, &at) in grid.at.iter().enumerate() {
-            while span + 1 < path.spans() && path.breaks[span + 1] <= at {
-                span += 1;
-            }
-            let x = (at - path.breaks[span]) as f64 * path.step;
-            let (mut linear, mut rotary) = (0.0, 0.0);
-            for (column, &wanted) in self.columns().zip(self.points.row(i)) {
-                let index = self.points.axes[column];
-                let piece = path.piece(index, span);
-                let origin = piece.base as f64 * path.axes[index].lsb;
-                let offset = piece.offset(x);
-                let rounding = DEVIATION_ROUNDING * (wanted.abs() + origin.abs() + offset.abs());
-                let miss = (origin - wanted + offset).abs() + rounding;
+    /// Distance of a way-point from the curve, as a bound: measured at `x` and where the tangent there leads to, between
+    /// 0 and `end`. `jet` gives value and slope of a column.
+    pub(super) fn distance(
+        &self,
+        wanted: &[f64],
+        x: f64,
+        end: f64,
+        jet: impl Fn(usize, f64) -> [f64; 2],
+    ) -> f64 {
+        let measure = |x: f64| {
+            let (mut linear, mut rotary, mut along, mut square) = (0.0, 0.0, 0.0, 0.0);
+            for ((column, weight), wanted) in self.columns().zip(self.weights).zip(wanted) {
+                let [value, slope] = jet(column, x);
+                let miss = wanted - value;
                 match self.axis(column).kind {
                     AxisKind::Linear => linear += miss * miss,
                     AxisKind::Rotary => rotary += miss * miss,
                 }
+                along += weight * weight * miss * slope;
+                square += weight * weight * slope * slope;
             }
-            let miss = size(linear, rotary);
+            let step = if square > 0.0 { along / square } else { 0.0 };
+            (self.size(linear, rotary), (x + step).clamp(0.0, end))
+        };
+        let (first, nearer) = measure(x);
+        first.min(measure(nearer).0)
+    }
+
+    /// Length of a deviation from the squares of its linear and its rotary part [mm].
+    fn size(&self, linear: f64, rotary: f64) -> f64 {
+        linear.sqrt().max(rotary.sqrt() * self.points.rotary_scale())
+    }
+
+    /// Largest distance of the rounded path from a way-point, measured near its place.
+    fn deviation(&self, path: &GridPath, places: &[f64]) -> Deviation {
+        let (mut bound_mm, mut line) = (0.0, self.points.lines[0]);
+        let mut span = 0;
+        for (i, &at) in places.iter().enumerate() {
+            while span + 1 < path.spans() && path.breaks[span + 1] as f64 <= at {
+                span += 1;
+            }
+            let x = (at - path.breaks[span] as f64) * path.step;
+            let end = (path.breaks[span + 1] - path.breaks[span]) as f64 * path.step;
+            let wanted = self.points.row(i);
+            let pieces: Vec<_> =
+                self.points.axes.iter().map(|&index| (index, path.piece(index, span))).collect();
+            let origin = |index: usize, base: i64| base as f64 * path.axes[index].lsb;
+            let jet = |column: usize, x: f64| {
+                let (index, piece) = &pieces[column];
+                [origin(*index, piece.base) + piece.offset(x), piece.first(x)]
+            };
+            let rounding: f64 = pieces
+                .iter()
+                .zip(wanted)
+                .map(|((index, piece), wanted)| {
+                    let origin = origin(*index, piece.base);
+                    DEVIATION_ROUNDING * (2.0 * wanted.abs() + 2.0 * origin.abs() + piece.offset(x).abs())
+                })
+                .sum();
+            let miss =
+                self.distance(wanted, x, end, jet) + self.size(rounding * rounding, rounding * rounding);
             if miss > bound_mm {
                 (bound_mm, line) = (miss, self.points.lines[i]);
             }
@@ -318,8 +383,8 @@ impl Fit<'_> {
             let axes = self.columns().map(|c| self.axis(c)).filter(|a| a.kind == kind);
             axes.map(|a| (0.5 / a.counts_per_unit).powi(2)).sum()
         };
-        let resolution = size(halves(AxisKind::Linear), halves(AxisKind::Rotary));
-        Deviation { tolerance_mm: self.points.machine.tolerance_mm.max(resolution), bound_mm, line }
+        let resolution = self.size(halves(AxisKind::Linear), halves(AxisKind::Rotary));
+        Deviation { tolerance_mm: self.form.tolerance_mm.max(resolution), bound_mm, line }
     }
 }
 

@@ -49,12 +49,22 @@ pub(super) fn read<'m>(
     let columns = header(&record, name, machine)?;
     let axes = columns.iter().map(|c| c.axis).collect();
     let mut points = Collector::new(name, machine, axes);
+    points.0.digits.fill(f64::INFINITY);
     let mut row = Vec::with_capacity(columns.len());
     while record.next(&mut source, &mut csv, name)? {
         record.numbers(&columns, machine, name, &mut row)?;
         points.push(&row, record.line)?;
+        record.digits(&columns, &mut points.0.digits);
     }
     points.finish()
+}
+
+/// What a one in the last digit of a number stands for.
+fn last_digit(text: &str) -> f64 {
+    let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
+    let decimals = mantissa.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let exponent = exponent.parse::<i32>().unwrap_or(0);
+    10f64.powi(exponent.saturating_sub(i32::try_from(decimals).unwrap_or(i32::MAX)))
 }
 
 impl Record {
@@ -176,6 +186,14 @@ impl Record {
             row.push(value);
         }
         Ok(())
+    }
+
+    /// Notes the last digits of the columns where they are finer than any before.
+    fn digits(&self, columns: &[Column], finest: &mut [f64]) {
+        for ((i, column), finest) in columns.iter().enumerate().zip(finest) {
+            let digit = std::str::from_utf8(self.field(i)).map_or(0.0, last_digit) * column.scale;
+            *finest = finest.min(digit);
+        }
     }
 }
 

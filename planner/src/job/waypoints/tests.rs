@@ -290,6 +290,70 @@ fn what_the_spline_cannot_do_is_refused_at_its_line() {
     assert!(matches!(kind, Kind::Stall { .. }), "{kind:?} {line:?}");
 }
 
+/// Way-points on a circle of radius 20 mm, written with so many decimals.
+fn circle(count: usize, decimals: usize) -> String {
+    let angle = |i: usize| std::f64::consts::TAU * i as f64 / (count - 1) as f64;
+    let row = |i: usize| {
+        let (y, x) = angle(i).sin_cos();
+        format!("{:.decimals$},{:.decimals$}\n", 20.0 * x - 20.0, 20.0 * y)
+    };
+    "X,Y\n".to_owned() + &(0..count).map(row).collect::<String>()
+}
+
+/// Distance of a way-point from a path, by looking at many places of it.
+fn sampled_distance(path: &GridPath, point: &Point, samples: u64) -> f64 {
+    let end = path.grid_length();
+    let at = |k: u64| (u128::from(end) * u128::from(k) / u128::from(samples)) as u64;
+    (0..=samples)
+        .map(|k| (0..2).map(|a| (position(path, a, at(k)) - point[a]).powi(2)).sum::<f64>().sqrt())
+        .fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn dense_way_points_need_few_knots() {
+    let machine = machine();
+    for (decimals, most) in [(3, 700), (6, 100), (12, 100)] {
+        let text = circle(3000, decimals);
+        let points = read_from(text.as_bytes(), "circle.csv", &machine).unwrap();
+        assert_eq!(points.resolution_mm(), 1e-3, "{decimals} decimals");
+        for ends in ALL_ENDS {
+            let exact = form(ends, Knots::Chord);
+            let near = SplineForm { tolerance_mm: points.resolution_mm(), ..exact };
+            let section = points.section(&near, None).unwrap();
+            assert!(section.path.spans() < most, "{} spans with {decimals} decimals", section.path.spans());
+            let deviation = section.marks.deviation;
+            assert!(deviation.bound_mm <= 1e-3, "{deviation:?}");
+            for i in (0..points.count()).step_by(97) {
+                let found = sampled_distance(&section.path, &points.point(i), 20_000);
+                // Samples are up to 7 um apart: at most half of that along the path.
+                assert!(found <= deviation.bound_mm.hypot(3.6e-3), "{i}: {found} {deviation:?}");
+            }
+            assert_eq!(section.marks.blocks.len(), points.count() - 1);
+            assert!(points.section(&exact, None).unwrap().path.spans() >= points.count() - 3);
+        }
+    }
+}
+
+#[test]
+fn rough_way_points_are_all_knots() {
+    let machine = machine();
+    let rows = (0..400).map(|i| [f64::from(i) * 0.2, if i % 2 == 0 { 0.0 } else { 0.3 }]);
+    let points = WayPoints::from_rows(rows, [0, 1], "zigzag.csv", &machine).unwrap();
+    let near = SplineForm { tolerance_mm: 1e-3, ..form(Ends::Natural, Knots::Chord) };
+    assert_eq!(points.section(&near, None).unwrap().path.spans(), 399);
+}
+
+#[test]
+fn the_last_digit_counts_as_far_as_it_is_fine() {
+    let machine = machine();
+    let resolution = |text: &str| read_from(text.as_bytes(), "job.csv", &machine).unwrap().resolution_mm();
+    let tolerance = machine.tolerance_mm;
+    // Whole millimetres are exact positions, not ones within a millimetre.
+    assert_eq!(resolution("X,Y\n0,0\n10,3\n20,5\n"), 0.1 * tolerance);
+    assert_eq!(resolution("X,Y\n0,0\n10.001,3.25\n20,5\n"), 1e-3f64.max(0.1 * tolerance));
+    assert_eq!(resolution("X,Y\n0,0\n1.00012e1,3.25001\n20,5\n"), 1e-3);
+}
+
 #[test]
 fn rows_from_memory_are_checked_too() {
     let machine = machine();
