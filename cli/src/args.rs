@@ -402,9 +402,11 @@ fn tolerance(text: &str) -> Result<f64, String> {
 }
 
 fn feed(text: &str) -> Result<f64, String> {
+    /// Feeds of machines, with decades to spare on either side.
+    const SENSIBLE: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
     match text.parse::<f64>() {
-        Ok(feed) if feed.is_finite() && feed > 0.0 => Ok(feed),
-        Ok(_) => Err("a feed is a finite speed above zero, in millimetres per minute".into()),
+        Ok(feed) if SENSIBLE.contains(&feed) => Ok(feed),
+        Ok(_) => Err("a feed is a speed between 0.000001 and 1000000000 millimetres per minute".into()),
         Err(_) => Err("not a number; give millimetres per minute, such as 1500".into()),
     }
 }

@@ -20,9 +20,9 @@ pub fn of_axis(axis: usize) -> String {
     css(HUES[axis % HUES.len()])
 }
 
-/// The colour of a method in a comparison as a CSS colour; there is one more than hues, and grey.
+/// The colour of a method in a comparison as a CSS colour: after the hues violet, grey and black.
 pub fn of_method(method: usize) -> String {
-    const MORE: [Rgb; 2] = [[0x6f, 0x4e, 0xa1], [0x7d, 0x86, 0x92]];
+    const MORE: [Rgb; 3] = [[0x6f, 0x4e, 0xa1], [0x7d, 0x86, 0x92], [0x2b, 0x30, 0x36]];
     let all = HUES.len() + MORE.len();
     css(HUES.iter().chain(&MORE).copied().nth(method % all).unwrap_or(MORE[1]))
 }
@@ -53,6 +53,11 @@ fn css([r, g, b]: Rgb) -> String {
 mod tests {
     use super::*;
     use std::collections::BTreeSet;
+
+    #[test]
+    fn ten_methods_have_ten_colours() {
+        assert_eq!((0..10).map(of_method).collect::<BTreeSet<_>>().len(), 10);
+    }
 
     #[test]
     fn every_limit_of_seven_axes_has_its_own_colour() {

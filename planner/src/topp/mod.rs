@@ -40,7 +40,7 @@ use sweep::Sweep;
 /// Solutions on ever finer knots.
 const MOST_SOLUTIONS: usize = 6;
 /// Rounds of dividing spans where that saves time.
-const MOST_ROUNDS: usize = 2;
+const MOST_ROUNDS: usize = 3;
 
 /// Finds the fastest motion from rest to rest along a path, rounded.
 ///

@@ -40,13 +40,13 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// Interior point, a gap of 5e-5 of the time, four spans per ramp and more where they save 0.1 % of the time.
+    /// Interior point, a gap of 5e-5 of the time, four spans per ramp and more where they save 0.02 % of the time.
     fn default() -> Self {
         Settings {
             solver: Solver::InteriorPoint,
             relative_gap: 5e-5,
             spans_per_ramp: 4.0,
-            largest_loss: 1e-3,
+            largest_loss: 2e-4,
             jerk: JerkForm::True,
             rows: RowForm::Bernstein,
             windows: Windows::Overlap,
