@@ -4,10 +4,11 @@
 //! root only, so the same source gives the same bits on every machine.
 //!
 //! [`table`] is the one door: bytes become a [`table::CheckedTable`] or a named error. [`evaluate`] plays a
-//! checked table at any path time. [`player`] is the axis' state machine on the level of messages;
+//! checked table at any path time. [`double_s`] plans motion where there is no table. [`player`] is the axis' state machine on the level of messages;
 //! [`drive`] puts it behind CAN frames.
 #![no_std]
 
+pub mod double_s;
 pub mod drive;
 pub mod evaluate;
 mod math;

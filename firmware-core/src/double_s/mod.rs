@@ -1,0 +1,108 @@
+//! Double-S motion, planned online: from any position, velocity and acceleration to any other, in the least time.
+//!
+//! Velocity, acceleration and jerk keep limits that need not be symmetric. The whole third-order problem is one root on
+//! one curve ([`chain`]): of all motions that take a given time the furthest has the jerks + 0 - 0 +, and these form
+//! a chain of one parameter. Every other case is that chain in a mirror, or played backwards. There is no enumeration
+//! of profiles, no polynomial root finder, no unit and no absolute tolerance. A start outside its limits is first led
+//! back the fastest way. Every motion is integrated from its start and refused unless it arrives within its limits.
+//!
+//! The same source runs in `f32` on a drive and, with the feature `host`, in `f64`. Cost: a bounded search of one
+//! evaluation of the chain per step, less than one on average. Terms after Biagiotti and Melchiorri 2008, section 3.4.
+
+mod accept;
+mod chain;
+mod limits;
+mod profile;
+mod real;
+mod recovery;
+mod root;
+mod solve;
+mod task;
+#[cfg(test)]
+mod tests;
+
+pub use limits::{Bounds, DoubleSError, MotionLimits, Quantity, State};
+pub use profile::{MOST_SEGMENTS, Profile, Segment};
+pub use real::Real;
+
+use solve::Solution;
+use task::Task;
+
+/// The fastest motion from a state to another.
+///
+/// # Errors
+/// [`DoubleSError`] names the number that is none, or the limit that makes no sense or that the target breaks. A start
+/// outside its limits is none: it is led back into them first.
+pub fn plan<R: Real>(
+    from: &State<R>,
+    to: &State<R>,
+    limits: &MotionLimits<R>,
+) -> Result<Profile<R>, DoubleSError> {
+    check(from, to, limits)?;
+    finish(from, Some(to), to, limits)
+}
+
+/// The fastest motion from a state to a velocity that is then kept, wherever that is.
+///
+/// # Errors
+/// As [`plan`].
+pub fn plan_velocity<R: Real>(
+    from: &State<R>,
+    velocity: R,
+    limits: &MotionLimits<R>,
+) -> Result<Profile<R>, DoubleSError> {
+    let to = State { position: from.position, velocity, acceleration: R::ZERO };
+    check(from, &to, limits)?;
+    finish(from, None, &to, limits)
+}
+
+fn check<R: Real>(from: &State<R>, to: &State<R>, limits: &MotionLimits<R>) -> Result<(), DoubleSError> {
+    limits.check()?;
+    if let Some(quantity) = from.fault() {
+        return Err(DoubleSError::Start(quantity));
+    }
+    if let Some(quantity) = to.fault() {
+        return Err(DoubleSError::Target(quantity));
+    }
+    if !limits.velocity.hold(to.velocity) {
+        return Err(DoubleSError::TargetOutside(Quantity::Velocity));
+    }
+    if !limits.acceleration.hold(to.acceleration) {
+        return Err(DoubleSError::TargetOutside(Quantity::Acceleration));
+    }
+    let band = recovery::band(&limits.velocity, to.velocity);
+    let start = Task::new(from, to, limits).start_velocity();
+    let widened = Bounds { min: limits.velocity.min - band, max: limits.velocity.max + band };
+    if widened.hold(start) { Ok(()) } else { Err(DoubleSError::TargetUnreachable) }
+}
+
+/// Recovery, then the fastest motion to `to`, or with its end anywhere.
+fn finish<R: Real>(
+    from: &State<R>,
+    to: Option<&State<R>>,
+    aim: &State<R>,
+    limits: &MotionLimits<R>,
+) -> Result<Profile<R>, DoubleSError> {
+    let mut profile = Profile::at_rest(*from);
+    let inside = recovery::recover(*from, limits, &mut profile).ok_or(DoubleSError::Precision)?;
+    let outside = profile.segments().len();
+    let mut task = Task::new(&inside, aim, limits);
+    // What is outside by rounding only is no reason to turn back.
+    let (start, stop) = (task.start_velocity(), task.stop_velocity());
+    task.v_max = task.v_max.most(start).most(stop);
+    task.v_min = task.v_min.least(start).least(stop);
+    let solution: Solution<R> = if to.is_some() { solve::fastest(&task) } else { solve::quickest(&task) };
+    for part in solution.parts() {
+        let start = State { position: inside.position + part.start.position, ..part.start };
+        if !profile.push(Segment { start, ..part }) {
+            return Err(DoubleSError::Precision);
+        }
+    }
+    let end = match to {
+        Some(to) => *to,
+        None => State { position: inside.position + solution.distance(), ..*aim },
+    };
+    profile.ends_at(end);
+    accept::check(&profile, from, outside, limits)?;
+    Ok(profile)
+}
