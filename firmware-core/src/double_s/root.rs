@@ -135,7 +135,9 @@ fn held<R: Real>(chain: &Chain<R>, from: R, rest: R) -> R {
     let z = chain.begin() + from;
     let pace = chain.pace(z);
     let q = rest / (R::ONE / t.a_up + R::ONE / t.a_down);
-    let w = R::whole(2) * q / (pace + (pace * pace + R::whole(2) * q).root());
+    let root = (pace * pace + R::whole(2) * q).root();
+    // The positive root, without a difference of like numbers.
+    let w = if pace > R::ZERO { R::whole(2) * q / (pace + root) } else { root - pace };
     from + w / (chain.k * (z + (z * z + w / chain.k).root()))
 }
 
