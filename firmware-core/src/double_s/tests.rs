@@ -235,7 +235,7 @@ fn quickest_beside(from: &State<f64>, to: &State<f64>, l: &MotionLimits<f64>, pa
 #[test]
 fn no_random_motion_is_faster() {
     let mut sooner = 0;
-    cases(3, 60_000, |chance| {
+    cases(3, 80_000, |chance| {
         let symmetric = chance.one_in(2);
         let l = limits(chance, symmetric);
         let from = inside(chance, &l);
