@@ -15,8 +15,6 @@ const BINDING_SLACK: f64 = 1e-3;
 const MOST_CURVED: f64 = 0.25;
 /// Longest duration of a table span [s].
 const LONGEST_S: f64 = 1.0;
-/// The same of a span that is one grid step long: it cannot be divided, and the format allows it.
-const LONGEST_STEP_S: f64 = 200.0;
 /// Duration that spans which are too long are divided to [s].
 const DIVIDED_S: f64 = 0.4;
 
@@ -167,11 +165,8 @@ pub(super) fn format(layout: &Layout, table: &FeedTable) -> Option<Vec<u32>> {
     for (i, part) in parts.iter_mut().enumerate() {
         let law = table.law(i);
         let seconds = law.duration();
-        // As many parts as there are grid steps; a single step has to be divided in vain.
-        let steps = layout.knots[i + 1] - layout.knots[i];
-        let most = 1 << steps.ilog2().clamp(1, 20);
-        if seconds >= LONGEST_S && (steps > 1 || seconds >= LONGEST_STEP_S) {
-            *part = ((seconds / DIVIDED_S).ceil().min(1e6) as u32).next_power_of_two().min(most);
+        if seconds >= LONGEST_S {
+            *part = ((seconds / DIVIDED_S).ceil().min(1e6) as u32).next_power_of_two();
             sound = false;
         }
         if let SpanLaw::Quadratic { h, q: [alpha, beta, gamma] } = law {
@@ -181,7 +176,7 @@ pub(super) fn format(layout: &Layout, table: &FeedTable) -> Option<Vec<u32>> {
             if curved > MOST_CURVED || alpha <= 0.0 || end <= 0.0 {
                 // At the same q, the argument falls with the square of the length.
                 let parts = (1.2 * (curved / MOST_CURVED).sqrt()).ceil().clamp(2.0, 8.0);
-                *part = (*part).max((parts as u32).next_power_of_two().min(most));
+                *part = (*part).max((parts as u32).next_power_of_two());
                 sound = false;
             }
         }
