@@ -57,11 +57,11 @@ struct Jumps<R> {
 }
 
 impl<R: Real> Jumps<R> {
-    /// NaN counts as a jump: it is no number at most any.
+    /// NaN is the worst jump, whenever it comes.
     fn note(&mut self, end: &State<R>, next: &State<R>) {
         let worse = |known: R, a: R, b: R| {
             let off = (a - b).abs();
-            if off <= known { known } else { off }
+            if known >= off || !known.is_finite() { known } else { off }
         };
         self.position = worse(self.position, end.position, next.position);
         self.velocity = worse(self.velocity, end.velocity, next.velocity);
@@ -73,4 +73,18 @@ impl<R: Real> Jumps<R> {
 fn extreme<R: Real>(segment: &Segment<R>) -> R {
     let (State { velocity, acceleration: a, .. }, j) = (segment.start, segment.jerk);
     if a * (a + j * segment.duration) < R::ZERO { velocity - R::HALF * a * a / j } else { velocity }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_that_is_no_number_is_not_forgotten() {
+        let state = |position: f32| State { position, velocity: 0.0, acceleration: 0.0 };
+        let mut jumps = Jumps { position: 0.0, velocity: 0.0, acceleration: 0.0 };
+        jumps.note(&state(f32::NAN), &state(0.0));
+        jumps.note(&state(1.0), &state(1.0));
+        assert!(jumps.position.is_nan());
+    }
 }

@@ -73,6 +73,11 @@ impl<R: Real> Bounds<R> {
         self.min < R::ZERO && self.max > R::ZERO && self.min.is_finite() && self.max.is_finite()
     }
 
+    /// The same limits seen in a mirror.
+    fn mirrored(&self) -> Self {
+        Self { min: -self.max, max: -self.min }
+    }
+
     pub(super) fn hold(&self, x: R) -> bool {
         self.min <= x && x <= self.max
     }
@@ -85,6 +90,15 @@ impl<R: Real> MotionLimits<R> {
             velocity: Bounds::symmetric(velocity),
             acceleration: Bounds::symmetric(acceleration),
             jerk: Bounds::symmetric(jerk),
+        }
+    }
+
+    /// The same limits seen in a mirror.
+    pub(super) fn mirrored(&self) -> Self {
+        Self {
+            velocity: self.velocity.mirrored(),
+            acceleration: self.acceleration.mirrored(),
+            jerk: self.jerk.mirrored(),
         }
     }
 

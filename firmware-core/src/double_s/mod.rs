@@ -4,10 +4,10 @@
 //! one curve ([`chain`]): of all motions that take a given time the furthest has the jerks + 0 - 0 +, and these form
 //! a chain of one parameter. Every other case is that chain in a mirror, or played backwards. There is no enumeration
 //! of profiles, no polynomial root finder, no unit and no absolute tolerance. A start outside its limits is first led
-//! back the fastest way. Every motion is integrated from its start and refused unless it arrives within its limits.
+//! back the fastest way. Every motion is integrated, segment by segment, and refused unless it arrives within its limits.
 //!
-//! The same source runs in `f32` on a drive and, with the feature `host`, in `f64`. Cost: a bounded search of one
-//! evaluation of the chain per step, less than one on average. Terms after Biagiotti and Melchiorri 2008, section 3.4.
+//! The same source runs in `f32` on a drive and, with the feature `host`, in `f64`. Cost: a bounded search, one
+//! evaluation of the chain per step. Terms after Biagiotti and Melchiorri 2008, section 3.4.
 
 mod accept;
 mod chain;
@@ -39,7 +39,7 @@ pub fn plan<R: Real>(
     limits: &MotionLimits<R>,
 ) -> Result<Profile<R>, DoubleSError> {
     check(from, to, limits)?;
-    finish(from, Some(to), to, limits)
+    finish(from, to, limits, solve::fastest)
 }
 
 /// The fastest motion from a state to a velocity that is then kept, wherever that is.
@@ -53,7 +53,7 @@ pub fn plan_velocity<R: Real>(
 ) -> Result<Profile<R>, DoubleSError> {
     let to = State { position: from.position, velocity, acceleration: R::ZERO };
     check(from, &to, limits)?;
-    finish(from, None, &to, limits)
+    finish(from, &to, limits, solve::quickest)
 }
 
 fn check<R: Real>(from: &State<R>, to: &State<R>, limits: &MotionLimits<R>) -> Result<(), DoubleSError> {
@@ -76,33 +76,35 @@ fn check<R: Real>(from: &State<R>, to: &State<R>, limits: &MotionLimits<R>) -> R
     if widened.hold(start) { Ok(()) } else { Err(DoubleSError::TargetUnreachable) }
 }
 
-/// Recovery, then the fastest motion to `to`, or with its end anywhere.
+/// Recovery, and what `solver` says of the rest.
 fn finish<R: Real>(
     from: &State<R>,
-    to: Option<&State<R>>,
-    aim: &State<R>,
+    to: &State<R>,
     limits: &MotionLimits<R>,
+    solver: impl FnOnce(&Task<R>) -> Solution<R>,
 ) -> Result<Profile<R>, DoubleSError> {
     let mut profile = Profile::at_rest(*from);
     let inside = recovery::recover(*from, limits, &mut profile).ok_or(DoubleSError::Precision)?;
     let outside = profile.segments().len();
-    let mut task = Task::new(&inside, aim, limits);
+    let mut task = Task::new(&inside, to, limits);
     // What is outside by rounding only is no reason to turn back.
     let (start, stop) = (task.start_velocity(), task.stop_velocity());
     task.v_max = task.v_max.most(start).most(stop);
     task.v_min = task.v_min.least(start).least(stop);
-    let solution: Solution<R> = if to.is_some() { solve::fastest(&task) } else { solve::quickest(&task) };
+    let solution = solver(&task);
     for part in solution.parts() {
         let start = State { position: inside.position + part.start.position, ..part.start };
         if !profile.push(Segment { start, ..part }) {
             return Err(DoubleSError::Precision);
         }
     }
-    let end = match to {
-        Some(to) => *to,
-        None => State { position: inside.position + solution.distance(), ..*aim },
+    // A distance that was asked for comes back as it was: then the motion ends at the target itself.
+    let position = if solution.distance() == task.distance {
+        to.position
+    } else {
+        inside.position + solution.distance()
     };
-    profile.ends_at(end);
+    profile.ends_at(State { position, ..*to });
     accept::check(&profile, from, outside, limits)?;
     Ok(profile)
 }

@@ -3,6 +3,7 @@
 use super::limits::{Bounds, MotionLimits, State};
 use super::profile::{Profile, Segment};
 use super::real::Real;
+use super::task::{gained, k};
 
 /// What velocities may be off by and still count as within their limits [ulp of the largest one].
 const BAND_ULPS: u8 = 16;
@@ -34,19 +35,9 @@ pub(super) fn recover<R: Real>(
     let band = band(&limits.velocity, state.velocity);
     let (low, high) = (limits.velocity.min - band, limits.velocity.max + band);
     let (v, a) = (state.velocity, state.acceleration);
-    let stop = if a > R::ZERO {
-        v - R::HALF * a * a / limits.jerk.min
-    } else {
-        v - R::HALF * a * a / limits.jerk.max
-    };
-    if stop < low || (stop <= high && v <= high && v < low) {
-        let opposite = |b: &Bounds<R>| Bounds { min: -b.max, max: -b.min };
-        let mirrored = MotionLimits {
-            velocity: opposite(&limits.velocity),
-            acceleration: opposite(&limits.acceleration),
-            jerk: opposite(&limits.jerk),
-        };
-        down(state, &mirrored, profile, true)
+    let stop = gained(v, a, -limits.jerk.min, limits.jerk.max);
+    if stop < low || (stop <= high && v < low) {
+        down(state, &limits.mirrored(), profile, true)
     } else if stop > high || v > high {
         down(state, limits, profile, false)
     } else {
@@ -64,7 +55,7 @@ fn down<R: Real>(
     let turned = |x: R| if mirrored { -x } else { x };
     let (v, a) = (turned(state.velocity), turned(state.acceleration));
     let (up, fall) = (limits.jerk.max, -limits.jerk.min);
-    let k = R::HALF * (R::ONE / up + R::ONE / fall);
+    let k = k(up, fall);
     let most = -limits.acceleration.min;
     // Acceleration -y at which the velocity is at its limit, or would just not leave it on the other side.
     let to_limit = (a * a + R::whole(2) * fall * (v - limits.velocity.max)).root();

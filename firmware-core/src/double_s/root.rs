@@ -3,37 +3,48 @@
 use super::chain::{Chain, Link};
 use super::real::Real;
 
-/// The motion within `range` of the chain's first that covers the task's distance, the first of them; `None` where the
-/// distance is not between those of the two ends.
-pub(super) fn find<R: Real>(chain: &Chain<R>, range: R) -> Option<Link<R>> {
+/// Where the wanted distance lies on a chain.
+pub(super) enum Place<R> {
+    /// Before its first motion, this one: the chain of the reversed motion leads there.
+    Before(Link<R>),
+    /// At this motion.
+    At(Link<R>),
+    /// Beyond its last motion, this one.
+    Beyond(Link<R>),
+}
+
+/// The first motion within `range` of the chain's first that covers the task's distance.
+pub(super) fn find<R: Real>(chain: &Chain<R>, range: R) -> Place<R> {
     let wanted = chain.task.distance;
     let first = chain.link(R::ZERO);
     // On one side of the first motion there may be a gap: rounding must not decide on which side of it the target is.
     if nearly(&first, wanted) {
-        return Some(first);
+        return Place::At(first);
     }
     if wanted < first.distance {
-        return None;
+        return Place::Before(first);
     }
     // The distance rises, may fall where the acceleration never returns to zero, and rises again.
     if let Some(top) = summit(chain).filter(|top| *top > R::ZERO && *top < range) {
         let highest = chain.link(top);
         if wanted <= highest.distance {
-            return Some(within(chain, [R::ZERO, top], [first, highest]));
+            return Place::At(within(chain, [R::ZERO, top], [first, highest]));
         }
         return last(chain, [top, range], highest);
     }
     last(chain, [R::ZERO, range], first)
 }
 
-/// The motion on the last stretch of a chain; `None` where all of them fall short.
-fn last<R: Real>(chain: &Chain<R>, at: [R; 2], first: Link<R>) -> Option<Link<R>> {
+/// The motion on the last stretch of a chain.
+fn last<R: Real>(chain: &Chain<R>, at: [R; 2], first: Link<R>) -> Place<R> {
     let wanted = chain.task.distance;
     let last = chain.link(at[1]);
     if last.distance >= wanted {
-        Some(within(chain, at, [first, last]))
+        Place::At(within(chain, at, [first, last]))
+    } else if nearly(&last, wanted) {
+        Place::At(last)
     } else {
-        nearly(&last, wanted).then_some(last)
+        Place::Beyond(last)
     }
 }
 
@@ -54,13 +65,6 @@ fn miss<R: Real>(link: &Link<R>, wanted: R) -> R {
 
 fn tolerance<R: Real>(link: &Link<R>, wanted: R) -> R {
     R::whole(8) * R::ULP * (link.scale + wanted.abs())
-}
-
-/// Whether the wanted distance is less than what the first motion of the chain covers: then the chain of the reversed
-/// motion leads there.
-pub(super) fn falls_short<R: Real>(chain: &Chain<R>) -> bool {
-    let first = chain.link(R::ZERO);
-    chain.task.distance < first.distance && !nearly(&first, chain.task.distance)
 }
 
 /// How far from the first motion the distance stops rising for the first time; `None` where it never does.

@@ -4,7 +4,7 @@ use super::chain::{Chain, Link};
 use super::limits::State;
 use super::profile::Segment;
 use super::real::Real;
-use super::root;
+use super::root::{self, Place};
 use super::task::Task;
 
 /// Parts of a motion: up, hold, down, cruise, down, hold, up.
@@ -22,38 +22,43 @@ pub(super) struct Solution<R> {
 
 /// The fastest motion that covers the task's distance. Start and target are within their limits.
 pub(super) fn fastest<R: Real>(task: &Task<R>) -> Solution<R> {
-    let mirrored = task.start_velocity() < task.stop_velocity();
-    let upright = if mirrored { task.mirrored() } else { *task };
+    let (upright, mirrored) = upright(task);
     if let Some(solution) = island(&upright, mirrored) {
         return solution;
     }
-    let (chain, reversed) = directed(upright);
-    let range = chain.range();
-    let found = root::find(&chain, range);
-    let (link, cruise) = match found {
-        Some(link) => (link, None),
-        None => {
-            let link = chain.link(range);
-            (link, Some(((chain.task.distance - link.distance) / chain.task.v_max).most(R::ZERO)))
-        }
+    let (task, reversed, place) = directed(upright, Chain::range);
+    let (link, cruise) = match place {
+        Place::Before(link) | Place::At(link) => (link, None),
+        Place::Beyond(link) => (link, Some((task.distance - link.distance) / task.v_max)),
     };
-    Solution { task: chain.task, link, cruise, mirrored, reversed }
+    Solution { task, link, cruise, mirrored, reversed }
 }
 
 /// The fastest change of velocity, wherever it ends.
 pub(super) fn quickest<R: Real>(task: &Task<R>) -> Solution<R> {
-    let mirrored = task.start_velocity() < task.stop_velocity();
-    let upright = if mirrored { task.mirrored() } else { *task };
-    let chain = Chain::new(upright);
-    let link = chain.link(R::ZERO);
+    let (upright, mirrored) = upright(task);
+    let link = Chain::new(upright).link(R::ZERO);
     let task = Task { distance: link.distance, ..upright };
     Solution { task, link, cruise: None, mirrored, reversed: false }
 }
 
-/// The chain in the direction of time in which the distance lies on it.
-fn directed<R: Real>(task: Task<R>) -> (Chain<R>, bool) {
-    let chain = Chain::new(task);
-    if root::falls_short(&chain) { (Chain::new(task.reversed()), true) } else { (chain, false) }
+/// The task seen so that the velocity left without accelerations rises, and whether in a mirror.
+fn upright<R: Real>(task: &Task<R>) -> (Task<R>, bool) {
+    let mirrored = task.start_velocity() < task.stop_velocity();
+    (if mirrored { task.mirrored() } else { *task }, mirrored)
+}
+
+/// Where the distance lies on the chain, or on that of the reversed motion if it comes before the first; the task as that
+/// chain sees it, and whether it is reversed. `range` says how far a chain goes.
+fn directed<R: Real>(task: Task<R>, range: impl Fn(&Chain<R>) -> R) -> (Task<R>, bool, Place<R>) {
+    let found = |task: Task<R>| {
+        let chain = Chain::new(task);
+        root::find(&chain, range(&chain))
+    };
+    match found(task) {
+        Place::Before(_) => (task.reversed(), true, found(task.reversed())),
+        place => (task, false, place),
+    }
 }
 
 /// A motion on which the acceleration never returns to zero: where both accelerations point against the change of
@@ -70,11 +75,17 @@ fn island<R: Real>(upright: &Task<R>, mirrored: bool) -> Option<Solution<R>> {
     if task.v1 - task.v0 < least - rounding {
         return None;
     }
-    let (chain, reversed) = directed(task);
     // Up to where the first extremum is the start itself.
-    let end = -(chain.task.a0 * chain.task.a0 - chain.c).root();
-    let link = root::find(&chain, (end - chain.begin()).most(R::ZERO))?;
-    Some(Solution { task: chain.task, link, cruise: None, mirrored: !mirrored, reversed })
+    let range = |chain: &Chain<R>| {
+        let start = chain.task.a0 * chain.task.a0 - chain.c;
+        (-start.root() - chain.begin()).most(R::ZERO)
+    };
+    match directed(task, range) {
+        (task, reversed, Place::At(link)) => {
+            Some(Solution { task, link, cruise: None, mirrored: !mirrored, reversed })
+        }
+        (_, _, Place::Before(_) | Place::Beyond(_)) => None,
+    }
 }
 
 impl<R: Real> Solution<R> {

@@ -81,13 +81,18 @@ impl<R: Real> Task<R> {
         -gained(-self.v1, self.a1, self.j_up, self.j_down)
     }
 
-    /// Half of the sum of what a unit of jerk takes upwards and downwards.
+    /// See [`k`].
     pub(super) fn k(&self) -> R {
-        R::HALF * (R::ONE / self.j_up + R::ONE / self.j_down)
+        k(self.j_up, self.j_down)
     }
 }
 
+/// Half of the sum of what a unit of jerk takes upwards and downwards.
+pub(super) fn k<R: Real>(up: R, down: R) -> R {
+    R::HALF * (R::ONE / up + R::ONE / down)
+}
+
 /// `v` and what it gains while `a` falls to zero under `down`, or rises to it under `up`.
-fn gained<R: Real>(v: R, a: R, down: R, up: R) -> R {
+pub(super) fn gained<R: Real>(v: R, a: R, down: R, up: R) -> R {
     if a > R::ZERO { v + R::HALF * a * a / down } else { v - R::HALF * a * a / up }
 }
