@@ -135,7 +135,7 @@ impl JobArgs {
             (
                 given(&for_programs),
                 "a file of way-points",
-                "Only part programs have feeds and words to be read. Leave the option away.",
+                "A file of way-points has no words and no programmed feeds; --feed gives it one. Leave the option away.",
             )
         } else {
             (

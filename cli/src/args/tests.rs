@@ -64,9 +64,10 @@ fn tolerances_that_are_no_length_are_refused() {
 
 #[test]
 fn feeds_that_are_no_speed_are_refused() {
-    for bad in ["0", "-5", "nan", "inf", "fast", ""] {
+    for bad in ["0", "-5", "nan", "inf", "fast", "", "1e300", "1e-300"] {
         assert!(plan(&["a.csv", &format!("--feed={bad}")]).is_err(), "{bad}");
     }
+    assert!(plan(&["a.csv", "--feed=0.01"]).is_ok());
 }
 
 #[test]

@@ -146,11 +146,40 @@ fn jerk_forms_and_limits_are_told_and_ordered() {
         (time(&["--jerk", "none"], "none"), time(&[], "true"), time(&["--jerk", "pseudo"], "pseudo"));
     assert_eq!(time(&["--limits", "va"], "none"), free);
     assert!(free < real && real <= pseudo * (1.0 + 1e-4), "{free} {real} {pseudo}");
+    let stops = |words: &[&str]| number(&plan(words), "stop_every_block_time_s");
+    assert!(stops(&["--limits", "va"]) < stops(&[]));
     for windows in ["overlap", "whole", "zhao"] {
         assert_eq!(plan(&["--windows", windows])["windows"], windows);
     }
     let gap = number(&plan(&[]), "gap_estimate");
     assert!((0.0..1e-3).contains(&gap), "{gap}");
+}
+
+#[test]
+fn pseudo_jerk_counts_as_a_ruling_where_it_is_at_its_own_bound() {
+    let home = tempfile::tempdir().unwrap();
+    let jobs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs");
+    let machine = jobs.join("compact3.toml");
+    let words = ["--machine", machine.to_str().unwrap(), "--jerk", "pseudo"];
+    let told = tell(home.path(), "plan", &jobs.join("cat2d.csv"), &words);
+    let rulings = told["binding"].as_array().unwrap();
+    let share: f64 = rulings.iter().filter(|b| b["kind"] == "jerk").map(|b| number(b, "share")).sum();
+    // Measured against the true limit it hardly ever rules.
+    assert!(share > 0.2, "{share}");
+}
+
+#[test]
+fn a_tolerance_saves_spans_and_none_takes_the_path_through_every_point() {
+    let (near, exact) = (plan(&["--tolerance", "0.01"]), plan(&["--tolerance", "0"]));
+    let spans = |told: &Value| told["way_points"]["geometry_spans"].as_u64().unwrap();
+    assert!(spans(&near) < spans(&plan(&[])) || spans(&plan(&[])) < spans(&exact), "{near}");
+    assert!(2 * spans(&near) < spans(&exact), "{} {}", spans(&near), spans(&exact));
+    assert_eq!(near["tolerance_source"], "command line");
+    assert_eq!(plan(&[])["tolerance_source"], "resolution of the way-points");
+    for told in [near, exact] {
+        assert!(number(&told, "max_deviation_mm") <= number(&told, "tolerance_mm"));
+        assert_eq!(told["certificate"]["holds"], true);
+    }
 }
 
 #[test]

@@ -24,7 +24,8 @@ pub struct Problem<'a> {
 pub struct Settings {
     /// Which solver.
     pub solver: Solver,
-    /// Stop when the remaining gap is below this share of the time.
+    /// Stop when the remaining gap is below this share of the time; up to ten times it where two iterations on end gain next
+    /// to nothing. [`Plan::gap_s`] tells what is left.
     pub relative_gap: f64,
     /// q spans per A/J of motion time, to begin with.
     pub spans_per_ramp: f64,

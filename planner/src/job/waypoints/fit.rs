@@ -170,7 +170,7 @@ impl Fit<'_> {
 
     /// The positions that the spline of a column takes: the ends on whole counts, so that motion rests there
     /// exactly; likewise all of an axis that stands still.
-    fn values(&self, column: usize) -> Vec<f64> {
+    pub(super) fn values(&self, column: usize) -> Vec<f64> {
         let counts_per_unit = self.axis(column).counts_per_unit;
         let whole = |v: f64| (v * counts_per_unit).round() / counts_per_unit;
         let width = self.points.axes.len();

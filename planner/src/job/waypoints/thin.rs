@@ -5,7 +5,7 @@
 //! them, further apart, it is as close to the others and smooth.
 
 use super::fit::Fit;
-use crate::splines::cubic::{Cubic, CubicSystem, Ends};
+use crate::splines::cubic::{Cubic, CubicSystem};
 
 /// Distance of the knots to begin with [way-points].
 const STRIDE: usize = 128;
@@ -26,9 +26,10 @@ pub(super) fn kept(fit: &Fit<'_>, lengths: &[f64], tolerance: f64) -> Vec<usize>
     if stride == 1 || tolerance.is_nan() || tolerance <= 0.0 {
         return all();
     }
+    let values: Vec<Vec<f64>> = fit.columns().map(|column| fit.values(column)).collect();
     let mut kept: Vec<usize> = (0..count - 1).step_by(stride).chain([count - 1]).collect();
     for _ in 0..ROUNDS {
-        let Some(missed) = missed(fit, lengths, &kept, SHARE * tolerance) else { return all() };
+        let Some(missed) = missed(fit, &values, lengths, &kept, SHARE * tolerance) else { return all() };
         if missed.is_empty() {
             return kept;
         }
@@ -40,20 +41,17 @@ pub(super) fn kept(fit: &Fit<'_>, lengths: &[f64], tolerance: f64) -> Vec<usize>
 
 /// A way-point in the middle of every interval between knots in which one is further away than `reach`; `None` where
 /// there is no spline.
-fn missed(fit: &Fit<'_>, lengths: &[f64], kept: &[usize], reach: f64) -> Option<Vec<usize>> {
+fn missed(
+    fit: &Fit<'_>,
+    values: &[Vec<f64>],
+    lengths: &[f64],
+    kept: &[usize],
+    reach: f64,
+) -> Option<Vec<usize>> {
     let h: Vec<f64> = kept.windows(2).map(|w| lengths[w[0]..w[1]].iter().sum()).collect();
     let system = CubicSystem::new(h, fit.form.ends).ok()?;
-    let values: Vec<Vec<f64>> = fit
-        .columns()
-        .map(|column| {
-            let mut values: Vec<f64> = kept.iter().map(|&i| fit.points.row(i)[column]).collect();
-            let last = values.len() - 1;
-            if fit.form.ends == Ends::Periodic {
-                values[last] = values[0];
-            }
-            values
-        })
-        .collect();
+    let values: Vec<Vec<f64>> =
+        values.iter().map(|column| kept.iter().map(|&i| column[i]).collect()).collect();
     let splines: Vec<Cubic<'_>> = fit
         .columns()
         .zip(&values)
