@@ -14,7 +14,7 @@ use tests::meander::{limits, meander};
 use tests::tables::Random;
 
 const TICK_S: f64 = 1e-3;
-const GAP: f64 = 5e-5;
+const GAP: f64 = 1e-5;
 
 fn planned(path: &GridPath, rules: Rules) -> FeedTable {
     let problem = Problem { path, limits: rules.limits, caps: rules.caps, control_tick_s: TICK_S };
