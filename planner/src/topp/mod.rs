@@ -50,7 +50,8 @@ const MOST_ROUNDS: usize = 3;
 ///
 /// [`PlanError`] names what makes the problem one without an answer, and where.
 pub fn plan(problem: &Problem, settings: &Settings) -> Result<Plan, PlanError> {
-    plan_whole_up_to(window::WHOLE, problem, settings)
+    // On a worker of the pool: none of the short passes waits for threads to wake up.
+    rayon::scope(|_| plan_whole_up_to(window::WHOLE, problem, settings))
 }
 
 /// [`plan`], in windows when there are more than `whole` spans.

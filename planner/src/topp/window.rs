@@ -4,6 +4,7 @@ use std::cell::RefCell;
 
 use rayon::prelude::*;
 
+use super::horizon::Deadline;
 use super::ipm::{Run, Stretch, Workspace};
 use super::rows::RowSource;
 
@@ -22,9 +23,14 @@ thread_local! {
     static WORKSPACE: RefCell<Workspace> = RefCell::default();
 }
 
-/// Runs `f` in this thread's workspace: memory that has been touched once is kept. `f` must not wait for other threads.
-fn in_workspace<R>(f: impl FnOnce(&mut Workspace) -> R) -> R {
-    WORKSPACE.with_borrow_mut(f)
+/// Runs `f` in this thread's workspace: memory that has been touched once is kept. What else the thread does while `f`
+/// waits for others has a workspace of its own.
+pub(super) fn in_workspace<R>(f: impl FnOnce(&mut Workspace) -> R) -> R {
+    let mut work = WORKSPACE.take();
+    work.deadline = Deadline::NONE;
+    let result = f(&mut work);
+    WORKSPACE.set(work);
+    result
 }
 
 /// All runs together.

@@ -227,7 +227,8 @@ impl Horizon {
             return Ok(None);
         }
         let origin = self.arrived.origin() as f64 * self.arrived.step;
-        window::advance(self, deadline).map_err(|fault| moved(fault, origin))
+        // On a worker of the pool: none of the short passes waits for threads to wake up.
+        rayon::scope(|_| window::advance(self, deadline)).map_err(|fault| moved(fault, origin))
     }
 }
 

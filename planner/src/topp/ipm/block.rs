@@ -80,6 +80,18 @@ pub(super) struct Affine {
     pub(super) fall: f64,
 }
 
+impl Affine {
+    /// Both together.
+    pub(super) fn with(&self, other: &Affine) -> Affine {
+        Affine {
+            s1: self.s1 + other.s1,
+            s2: self.s2 + other.s2,
+            rise: self.rise.max(other.rise),
+            fall: self.fall.min(other.fall),
+        }
+    }
+}
+
 /// The jerk rows' common parts at one tangent.
 #[derive(Clone, Copy)]
 struct Tangent {

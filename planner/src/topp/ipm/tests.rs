@@ -1,5 +1,8 @@
 //! The interior point on a winding path: what its rows promise, checked without them where that can be.
 
+use pulp::Arch;
+
+use super::part::PART;
 use super::*;
 use crate::geometry::grid_path::{GridAxis, GridPath};
 use crate::job::machine::AxisLimits;
@@ -28,7 +31,7 @@ fn winding(spans: usize) -> GridPath {
 
 /// A workspace with the whole problem loaded, given to `f` with the row source.
 fn loaded<R>(jerk: JerkForm, f: impl FnOnce(&RowSource, &mut Workspace) -> R) -> R {
-    let path = winding(12);
+    let path = winding(24);
     let limits = [AxisLimits { velocity: V, acceleration: A, jerk: J }; 5];
     let problem = Problem { path: &path, limits: &limits, caps: &[], control_tick_s: 1e-3 };
     let sweep = Sweep::new(&problem);
@@ -96,7 +99,7 @@ fn every_iterate_keeps_every_limit_and_the_last_uses_them_up() {
                 work.c.clone_from(&work.best);
                 work.settle();
                 work.band.reset(work.c.len());
-                times.push(work.time());
+                times.push(work.total_time());
             }
             assert!(times.windows(2).all(|t| t[1] <= t[0] * (1.0 + 1e-9)), "{times:?}");
             let used = ratios(source, &work.best);
@@ -107,13 +110,29 @@ fn every_iterate_keeps_every_limit_and_the_last_uses_them_up() {
 
 #[test]
 fn the_instruction_set_changes_no_bit() {
-    let vector = loaded(JerkForm::True, |_, work| {
-        let run = work.solve(1e-5);
-        (run.iterations, work.moved())
-    });
-    let plain = loaded(JerkForm::True, |_, work| {
-        let run = work.iterate(1e-5);
-        (run.iterations, work.moved())
-    });
-    assert_eq!(vector, plain);
+    let answer = |arch: Arch| {
+        loaded(JerkForm::True, |_, work| {
+            work.parts.arch = arch;
+            let run = work.solve(1e-5);
+            (run.iterations, work.moved())
+        })
+    };
+    assert_eq!(answer(Arch::new()), answer(Arch::Scalar));
+}
+
+#[test]
+fn threads_change_no_bit_within_a_window() {
+    let answer = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            loaded(JerkForm::True, |_, work| {
+                assert!(work.c.len() > 2 * PART, "one part alone cannot tell");
+                let run = work.solve(1e-5);
+                (run.iterations, work.moved())
+            })
+        })
+    };
+    let one = answer(1);
+    assert_eq!(one, answer(2));
+    assert_eq!(one, answer(5));
 }

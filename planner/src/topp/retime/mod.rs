@@ -18,6 +18,7 @@ use super::layout::Layout;
 use super::problem::{JerkForm, Problem, RowForm};
 use super::rows::RowSource;
 use super::sweep::Sweep;
+use super::window::in_workspace;
 use super::{error, joints, rounding};
 use crate::certificate::certify;
 use crate::feed::table::FeedTable;
@@ -76,33 +77,8 @@ pub fn retime(
         return Err(RetimeError::Table);
     }
     let task = Task { table, knot, old, new, control_tick_s, relative_gap, deadline, unit };
-    let mut draft = task.draft(1);
-    if !task.keeps_old(&draft) {
-        draft = task.draft(CELLS);
-    }
-    let mut iterations = 0;
-    for _ in 0..MOST_DIVISIONS {
-        let layout = draft.layout(&table.path);
-        let source = task.source(new, &layout, &[]);
-        let parts = match task.solve(&layout, &draft.carried[1..], &mut iterations) {
-            Ok(found) => match check::format(&layout, &found.table) {
-                Some(parts) => parts,
-                None => return Ok(found),
-            },
-            // Long spans leave no room to slow down in.
-            Err(fault @ RetimeError::Unmet { .. }) => match task.finer(&source, &draft.carried) {
-                Some(parts) => parts,
-                None => return task.as_it_is().ok_or(fault),
-            },
-            Err(fault) => return Err(fault),
-        };
-        let refused = RetimeError::Format { u: layout.start(&table.path, knot) };
-        draft.divide(&source, &parts, knot + 1).map_err(|_| refused)?;
-        if draft.carried.len() < draft.knots.len() - 1 {
-            return Err(refused);
-        }
-    }
-    Err(RetimeError::Format { u: draft.knots[knot] as f64 * table.path.step })
+    // On a worker of the pool: none of the short passes waits for threads to wake up.
+    rayon::scope(|_| in_workspace(|work| task.plan(work)))
 }
 
 /// What is to be done.
@@ -118,6 +94,37 @@ struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
+    /// Divides spans until a plan is found on them.
+    fn plan(&self, work: &mut Workspace) -> Result<Retimed, RetimeError> {
+        let mut draft = self.draft(1);
+        if !self.keeps_old(&draft, work) {
+            draft = self.draft(CELLS);
+        }
+        let mut iterations = 0;
+        for _ in 0..MOST_DIVISIONS {
+            let layout = draft.layout(&self.table.path);
+            let source = self.source(self.new, &layout, &[]);
+            let parts = match self.solve(&layout, &draft.carried[1..], &mut iterations, work) {
+                Ok(found) => match check::format(&layout, &found.table) {
+                    Some(parts) => parts,
+                    None => return Ok(found),
+                },
+                // Long spans leave no room to slow down in.
+                Err(fault @ RetimeError::Unmet { .. }) => match self.finer(&source, &draft.carried) {
+                    Some(parts) => parts,
+                    None => return self.as_it_is(work).ok_or(fault),
+                },
+                Err(fault) => return Err(fault),
+            };
+            let refused = RetimeError::Format { u: layout.start(&self.table.path, self.knot) };
+            draft.divide(&source, &parts, self.knot + 1).map_err(|_| refused)?;
+            if draft.carried.len() < draft.knots.len() - 1 {
+                return Err(refused);
+            }
+        }
+        Err(RetimeError::Format { u: draft.knots[self.knot] as f64 * self.table.path.step })
+    }
+
     /// The spans of the table; those after the knot may be divided.
     fn draft(&self, fewest: u8) -> Draft {
         let n = self.table.spans();
@@ -140,11 +147,10 @@ impl<'a> Task<'a> {
     }
 
     /// Whether the rows of the draft's cells admit the old plan under the old limits.
-    fn keeps_old(&self, draft: &Draft) -> bool {
+    fn keeps_old(&self, draft: &Draft, work: &mut Workspace) -> bool {
         let layout = draft.layout(&self.table.path);
         let m = layout.unknowns();
         let swept = vec![f64::INFINITY; m];
-        let mut work = Workspace::default();
         let stretch = Stretch { from: self.knot, to: m };
         work.load(
             &self.source(self.old, &layout, &swept),
@@ -187,9 +193,17 @@ impl<'a> Task<'a> {
     }
 
     /// Solves on given knots; `x` is the old plan there.
-    fn solve(&self, layout: &Layout, x: &[f64], iterations: &mut u32) -> Result<Retimed, RetimeError> {
+    fn solve(
+        &self,
+        layout: &Layout,
+        x: &[f64],
+        iterations: &mut u32,
+        work: &mut Workspace,
+    ) -> Result<Retimed, RetimeError> {
         let x = &x[..layout.unknowns()];
-        let sweeps = [self.old, self.new].map(|rules| Sweep::new(&self.problem(rules)));
+        let sweep = |rules| Sweep::new(&self.problem(rules));
+        let (old, new) = rayon::join(|| sweep(self.old), || sweep(self.new));
+        let sweeps = [old, new];
         let swept = sweeps.each_ref().map(|s| swept(&self.problem(self.old), layout, s, self.unit));
         let (before, after) =
             (self.source(self.old, layout, &swept[0]), self.source(self.new, layout, &swept[1]));
@@ -198,7 +212,6 @@ impl<'a> Task<'a> {
             .map(|(source, sweep)| rounding::halves(source, self.table.q_scale, sweep));
         let mut half: Vec<f64> = slow.into_iter().zip(fast).map(|(a, b)| a.max(b)).collect();
         half[..self.knot].fill(0.0);
-        let mut work = Workspace::default();
         work.deadline = self.deadline;
         let m = x.len();
         let none = vec![0.0; m];
@@ -206,13 +219,16 @@ impl<'a> Task<'a> {
         let fits = work.settle() >= -ROW_ARITHMETIC;
         // Under the old limits the old plan has some room somewhere; the way down begins there.
         let start = if fits {
-            self.inside(&after, x, &half, &mut work)
+            self.inside(&after, x, &half, work)
+        } else if self.knot == 0 {
+            // Nothing moves yet: the whole plan is slowed down.
+            slow::all(&after, x, &half, work).map(|y| (y, 0))
         } else {
-            let found = self.inside(&before, x, &half, &mut work).and_then(|(y, from)| {
+            let found = self.inside(&before, x, &half, work).and_then(|(y, from)| {
                 half[self.knot..from].fill(0.0);
                 // The way down itself must not bend more than the format allows.
                 let before = RowSource { bends: true, ..before.clone() };
-                Transition { before: &before, after: &after, half: &half, from }.find(&y, &mut work)
+                Transition { before: &before, after: &after, half: &half, from }.find(&y, work)
             });
             if found.is_none() {
                 return Err(self.unmet());
@@ -243,8 +259,8 @@ impl<'a> Task<'a> {
             work.settle() >= -ROW_ARITHMETIC
         };
         let ramp = Stretch { from: self.knot, to: holds_from.max(self.knot + 1) - 1 };
-        let kept = sound(&after, Stretch { from: holds_from, to: m }, &mut work)
-            && (holds_from == self.knot || sound(&before, ramp, &mut work));
+        let kept = sound(&after, Stretch { from: holds_from, to: m }, work)
+            && (holds_from == self.knot || sound(&before, ramp, work));
         if !kept {
             return if fits { Ok(self.kept()) } else { Err(self.unmet()) };
         }
@@ -304,14 +320,13 @@ impl<'a> Task<'a> {
     }
 
     /// The old plan, from where it keeps the new limits anyway: on its way to rest it is slow in the end.
-    fn as_it_is(&self) -> Option<Retimed> {
+    fn as_it_is(&self, work: &mut Workspace) -> Option<Retimed> {
         let draft = self.draft(CELLS);
         let layout = draft.layout(&self.table.path);
         let m = layout.unknowns();
         let (x, none) = (&draft.carried[1..=m], vec![0.0; m]);
         let swept = vec![f64::INFINITY; m];
         let after = self.source(self.new, &layout, &swept);
-        let mut work = Workspace::default();
         let mut keeps = |j: usize| {
             work.load(&after, x, &none, Stretch { from: j, to: m }, |_| 0.0);
             work.settle() >= -ROW_ARITHMETIC

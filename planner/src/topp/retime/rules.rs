@@ -53,7 +53,8 @@ pub enum RetimeError {
     Table,
     /// The motion cannot be brought within the new limits before the table ends.
     #[error(
-        "the new {kind:?} limit of axis {axis} is exceeded {ratio} times at u = {u}, and the path ends first"
+        "the new {kind:?} limit{} is exceeded {ratio} times at u = {u}, and no way down to it is found before the path ends",
+        of_axis(*.kind, *.axis)
     )]
     Unmet {
         /// Place at which it is exceeded most, in u.
@@ -88,4 +89,9 @@ pub fn scaled(caps: &[FeedCap], factor: f64) -> Result<Vec<FeedCap>, RetimeError
         SpeedCap::Rate(rate) => SpeedCap::Rate(rate * factor),
     };
     Ok(caps.iter().map(|c| FeedCap { until: c.until, speed: speed(c.speed) }).collect())
+}
+
+/// Which axis a limit is of; a feed cap is of the path.
+fn of_axis(kind: LimitKind, axis: u16) -> String {
+    if kind == LimitKind::Feed { String::new() } else { format!(" of axis {axis}") }
 }

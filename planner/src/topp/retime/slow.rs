@@ -29,7 +29,7 @@ impl Transition<'_> {
     /// Slowing a motion down by one factor slows its acceleration by the same and its jerk by its power of 3/2, so
     /// the old plan has a factor that suits the new limits; the ramp changes over to it.
     pub(super) fn find(&self, x: &[f64], work: &mut Workspace) -> Option<(Vec<f64>, usize)> {
-        let factor = self.factor(x, work)?;
+        let factor = factor(self.after, x, self.half, self.from, work)?;
         let m = x.len();
         let mut best: Option<(usize, usize)> = None;
         for ramp in RAMPS {
@@ -67,22 +67,28 @@ impl Transition<'_> {
         }
         Some((y, high))
     }
+}
 
-    /// What the old plan has to be multiplied by to keep the new limits everywhere after the knot.
-    fn factor(&self, x: &[f64], work: &mut Workspace) -> Option<f64> {
-        let m = x.len();
-        let mut factor = 1.0;
-        for _ in 0..MOST_REDUCTIONS {
-            let y: Vec<f64> = x.iter().map(|x| x * factor).collect();
-            work.load(self.after, &y, self.half, Stretch { from: self.from, to: m }, |_| 0.0);
-            let slack = work.settle();
-            if slack > SLACK {
-                return Some(factor);
-            }
-            factor *= (1.0 - 1.5 * SLACK) / (1.0 - slack);
+/// The old plan `x` slowed down as a whole until it keeps limits.
+pub(super) fn all(limits: &RowSource, x: &[f64], half: &[f64], work: &mut Workspace) -> Option<Vec<f64>> {
+    let factor = factor(limits, x, half, 0, work)?;
+    Some(x.iter().map(|x| x * factor).collect())
+}
+
+/// What the old plan has to be multiplied by to keep limits from a control value on.
+fn factor(limits: &RowSource, x: &[f64], half: &[f64], from: usize, work: &mut Workspace) -> Option<f64> {
+    let m = x.len();
+    let mut factor = 1.0;
+    for _ in 0..MOST_REDUCTIONS {
+        let y: Vec<f64> = x.iter().map(|x| x * factor).collect();
+        work.load(limits, &y, half, Stretch { from, to: m }, |_| 0.0);
+        let slack = work.settle();
+        if slack > SLACK {
+            return Some(factor);
         }
-        None
+        factor *= (1.0 - 1.5 * SLACK) / (1.0 - slack);
     }
+    None
 }
 
 /// `x` up to control value `from`, then a smooth change over `ramp` of them to `factor` times x.
