@@ -28,6 +28,7 @@ thread_local! {
 pub(super) fn in_workspace<R>(f: impl FnOnce(&mut Workspace) -> R) -> R {
     let mut work = WORKSPACE.take();
     work.deadline = Deadline::NONE;
+    work.share_threads(false);
     let result = f(&mut work);
     WORKSPACE.set(work);
     result
@@ -102,10 +103,12 @@ pub(super) fn stage(
     relative_gap: f64,
 ) -> Total {
     let before: &[f64] = x;
+    let many = stretches.len() > rayon::current_num_threads();
     let solved: Vec<(Vec<f64>, Run)> = stretches
         .par_iter()
         .map(|&stretch| {
             in_workspace(|work| {
+                work.share_threads(many);
                 work.load(source, before, half, stretch, &margin);
                 let run = if work.settle() > 0.0 { work.solve(relative_gap) } else { Run::default() };
                 (if run.iterations == 0 { Vec::new() } else { work.moved() }, run)
@@ -128,10 +131,12 @@ pub(super) fn scale_all(source: &RowSource, x: &mut [f64], half: &[f64]) -> Opti
     let m = x.len();
     let starts: Vec<usize> = (0..m).step_by(WINDOW / 8).collect();
     let before: &[f64] = x;
+    let many = starts.len() > rayon::current_num_threads();
     let scale = starts
         .par_iter()
         .map(|&from| {
             in_workspace(|work| {
+                work.share_threads(many);
                 let stretch = Stretch { from, to: (from + WINDOW / 8).min(m) };
                 work.load(source, before, half, stretch, |_| 0.0);
                 work.scale_into()

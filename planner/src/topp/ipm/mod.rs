@@ -106,6 +106,11 @@ impl Workspace {
         }
     }
 
+    /// Whether other windows keep all threads busy, so that passes over this one need not be divided among them.
+    pub(super) fn share_threads(&mut self, with_others: bool) {
+        self.parts.in_turn = with_others;
+    }
+
     /// Scales the loaded profile down until its least slack is comfortable, pinned neighbours too, and returns the
     /// scale; `None` where that never happens.
     pub(super) fn scale_into(&mut self) -> Option<f64> {

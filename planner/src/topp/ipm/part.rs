@@ -74,6 +74,8 @@ enum Pass<'c> {
 pub(super) struct Parts {
     /// Instructions to use: the machine's best, unless a test asks for others.
     pub(super) arch: Arch,
+    /// One part after the other: where other windows keep the other threads busy.
+    pub(super) in_turn: bool,
     parts: Vec<Part>,
     used: usize,
 }
@@ -176,8 +178,9 @@ impl Parts {
     }
 
     fn each(&mut self, f: impl Fn(usize, &mut Part) + Sync) {
+        let in_turn = self.in_turn;
         let parts = &mut self.parts[..self.used];
-        if parts.len() == 1 || rayon::current_num_threads() == 1 {
+        if in_turn || parts.len() == 1 || rayon::current_num_threads() == 1 {
             parts.iter_mut().enumerate().for_each(|(at, part)| f(at, part));
         } else {
             parts.par_iter_mut().enumerate().for_each(|(at, part)| f(at, part));
