@@ -11,6 +11,7 @@ pub mod axis_scale;
 pub mod bus;
 pub mod drive_node;
 pub mod encoder;
+pub mod group;
 pub mod host_node;
 pub mod plant;
 pub mod recording;

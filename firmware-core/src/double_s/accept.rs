@@ -6,12 +6,13 @@ use super::real::Real;
 
 /// Integrates the segments of a motion: the first has to begin at `from`, each to end where the next one begins, the last
 /// one where the motion ends; and velocities have to keep their limits after the first segments, `outside` of them, which
-/// lead back into these.
-pub(super) fn check<R: Real>(
-    profile: &Profile<R>,
+/// lead back into these. `clock` is how well its times are known.
+pub(super) fn check<R: Real, const N: usize>(
+    profile: &Profile<R, N>,
     from: &State<R>,
     outside: usize,
     limits: &MotionLimits<R>,
+    clock: R,
 ) -> Result<(), DoubleSError> {
     let over = |velocity: R| (velocity - limits.velocity.max).most(limits.velocity.min - velocity);
     let slack = R::ACCEPTED * limits.velocity.max.most(-limits.velocity.min);
@@ -39,11 +40,13 @@ pub(super) fn check<R: Real>(
     // Far from zero, positions themselves are coarse.
     let coarse = R::whole(16) * R::ULP * from.position.abs().most(end.position.abs());
     let fastest = fastest.most(end.velocity.abs());
+    let steepest = steepest.most(end.acceleration.abs());
+    let jerk = limits.jerk.max.most(-limits.jerk.min);
     let finite = profile.duration().is_finite() && path.is_finite();
     let arrives = finite
-        && jumps.position <= R::ACCEPTED * path + coarse
-        && jumps.velocity <= R::ACCEPTED * fastest
-        && jumps.acceleration <= R::ACCEPTED * steepest.most(end.acceleration.abs());
+        && jumps.position <= R::ACCEPTED * path + coarse + clock * fastest
+        && jumps.velocity <= R::ACCEPTED * fastest + clock * steepest
+        && jumps.acceleration <= R::ACCEPTED * steepest + clock * jerk;
     // What is left of velocities far outside is their rounding.
     let slack = slack + R::whole(16) * R::ULP * fastest;
     if arrives && broken <= slack { Ok(()) } else { Err(DoubleSError::Precision) }

@@ -34,6 +34,15 @@ pub(super) struct Link<R> {
     pub(super) slope: R,
 }
 
+impl<R: Real> Link<R> {
+    /// How long it takes.
+    #[cfg(feature = "host")]
+    pub(super) fn duration(&self) -> R {
+        let [up, hold, down, held, last] = self.times;
+        up + hold + down + held + last
+    }
+}
+
 impl<R: Real> Chain<R> {
     pub(super) fn new(task: Task<R>) -> Self {
         let k = task.k();

@@ -20,10 +20,14 @@ mod solve;
 mod task;
 #[cfg(test)]
 mod tests;
+#[cfg(feature = "host")]
+mod timed;
 
 pub use limits::{Bounds, DoubleSError, MotionLimits, Quantity, State};
 pub use profile::{MOST_SEGMENTS, Profile, Segment};
 pub use real::Real;
+#[cfg(feature = "host")]
+pub use timed::{MOST_EDGES, TIMED_SEGMENTS, Timed};
 
 use solve::Solution;
 use task::Task;
@@ -76,6 +80,32 @@ fn check<R: Real>(from: &State<R>, to: &State<R>, limits: &MotionLimits<R>) -> R
     if widened.hold(start) { Ok(()) } else { Err(DoubleSError::TargetUnreachable) }
 }
 
+/// A start led back into its limits, and what is left to do from there.
+#[derive(Clone, Debug)]
+struct Inside<R> {
+    /// The way back.
+    profile: Profile<R>,
+    /// Where it ends.
+    inside: State<R>,
+    task: Task<R>,
+}
+
+/// Leads the start back into its limits.
+fn enter<R: Real>(
+    from: &State<R>,
+    to: &State<R>,
+    limits: &MotionLimits<R>,
+) -> Result<Inside<R>, DoubleSError> {
+    let mut profile = Profile::at_rest(*from);
+    let inside = recovery::recover(*from, limits, &mut profile).ok_or(DoubleSError::Precision)?;
+    let mut task = Task::new(&inside, to, limits);
+    // What is outside by rounding only is no reason to turn back.
+    let (start, stop) = (task.start_velocity(), task.stop_velocity());
+    task.v_max = task.v_max.most(start).most(stop);
+    task.v_min = task.v_min.least(start).least(stop);
+    Ok(Inside { profile, inside, task })
+}
+
 /// Recovery, and what `solver` says of the rest.
 fn finish<R: Real>(
     from: &State<R>,
@@ -83,14 +113,8 @@ fn finish<R: Real>(
     limits: &MotionLimits<R>,
     solver: impl FnOnce(&Task<R>) -> Solution<R>,
 ) -> Result<Profile<R>, DoubleSError> {
-    let mut profile = Profile::at_rest(*from);
-    let inside = recovery::recover(*from, limits, &mut profile).ok_or(DoubleSError::Precision)?;
+    let Inside { mut profile, inside, task } = enter(from, to, limits)?;
     let outside = profile.segments().len();
-    let mut task = Task::new(&inside, to, limits);
-    // What is outside by rounding only is no reason to turn back.
-    let (start, stop) = (task.start_velocity(), task.stop_velocity());
-    task.v_max = task.v_max.most(start).most(stop);
-    task.v_min = task.v_min.least(start).least(stop);
     let solution = solver(&task);
     for part in solution.parts() {
         let start = State { position: inside.position + part.start.position, ..part.start };
@@ -105,6 +129,6 @@ fn finish<R: Real>(
         inside.position + solution.distance()
     };
     profile.ends_at(State { position, ..*to });
-    accept::check(&profile, from, outside, limits)?;
+    accept::check(&profile, from, outside, limits, R::ZERO)?;
     Ok(profile)
 }

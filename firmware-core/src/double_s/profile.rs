@@ -21,8 +21,8 @@ pub struct Segment<R> {
 
 /// A motion from state to state.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Profile<R> {
-    segments: Vec<Segment<R>, MOST_SEGMENTS>,
+pub struct Profile<R, const N: usize = MOST_SEGMENTS> {
+    segments: Vec<Segment<R>, N>,
     duration: R,
     end: State<R>,
 }
@@ -45,7 +45,7 @@ impl<R: Real> Segment<R> {
     }
 }
 
-impl<R: Real> Profile<R> {
+impl<R: Real, const N: usize> Profile<R, N> {
     /// No motion yet.
     pub(super) fn at_rest(state: State<R>) -> Self {
         Self { segments: Vec::new(), duration: R::ZERO, end: state }

@@ -67,6 +67,20 @@ fn tolerance<R: Real>(link: &Link<R>, wanted: R) -> R {
     R::whole(8) * R::ULP * (link.scale + wanted.abs())
 }
 
+/// The first extremum is held at its limit beyond this y = -z.
+fn joint<R: Real>(chain: &Chain<R>) -> R {
+    (chain.task.a_up * chain.task.a_up - chain.c).root()
+}
+
+/// Where the pace is lowest, as y = -z.
+fn lowest_y<R: Real>(chain: &Chain<R>) -> R {
+    let (t, two, joint) = (&chain.task, R::whole(2), joint(chain));
+    let r = t.j_down / t.j_up;
+    let rho = R::ONE + r + (r * r + two * r).sqrt();
+    let (held, free) = (t.a_up / (two * (R::ONE + r)), (chain.c / (rho * rho - R::ONE)).root());
+    if held > joint { held } else { free.least(joint) }
+}
+
 /// How far from the first motion the distance stops rising for the first time; `None` where it never does.
 ///
 /// The pace falls only while z < 0. With y = -z its lowest point and, left of it, its root are in closed form, with
@@ -78,12 +92,8 @@ fn summit<R: Real>(chain: &Chain<R>) -> Option<R> {
     }
     let (two, quarter) = (R::whole(2), R::HALF * R::HALF);
     let Chain { c, w, k, .. } = *chain;
-    // Held while c + y^2 > a_up^2.
-    let joint = (t.a_up * t.a_up - c).root();
-    let r = t.j_down / t.j_up;
-    let rho = R::ONE + r + (r * r + two * r).sqrt();
-    let (held, free) = (t.a_up / (two * (R::ONE + r)), (c / (rho * rho - R::ONE)).root());
-    let lowest = if held > joint { held } else { free.least(joint) }.least(t.a1);
+    let joint = joint(chain);
+    let lowest = lowest_y(chain).least(t.a1);
     if chain.pace(-lowest) >= R::ZERO {
         return None;
     }
@@ -101,11 +111,46 @@ fn summit<R: Real>(chain: &Chain<R>) -> Option<R> {
     Some(t.a1 - root.most(lowest).least(t.a1))
 }
 
+/// Where the distance stops rising and where it rises again, within `range` of the first motion; both at the first where
+/// it never falls.
+#[cfg(feature = "host")]
+pub(super) fn turns<R: Real>(chain: &Chain<R>, range: R) -> [R; 2] {
+    let begin = chain.begin();
+    let rises = |s: R| chain.pace(begin + s) >= R::ZERO;
+    let top = if chain.pace(begin) > R::ZERO {
+        match summit(chain) {
+            Some(top) if top < range => top.most(R::ZERO),
+            _ => return [R::ZERO; 2],
+        }
+    } else {
+        R::ZERO
+    };
+    // From there on the pace falls before it rises: it is lowest within z < 0, and has one root beyond.
+    let (mut low, mut high) = (top.most(lowest(chain)).least(range), range);
+    if !rises(high) {
+        return [top, range];
+    }
+    for _ in 0..4 * R::MOST_STEPS {
+        let middle = R::HALF * (low + high);
+        if !(middle > low && middle < high) {
+            break;
+        }
+        if rises(middle) { high = middle } else { low = middle }
+    }
+    [top, high]
+}
+
+/// How far from the first motion the pace is lowest.
+#[cfg(feature = "host")]
+fn lowest<R: Real>(chain: &Chain<R>) -> R {
+    (chain.task.a1 - lowest_y(chain)).most(R::ZERO)
+}
+
 /// The motion between two of the chain that lie on either side of the wanted distance, the distance rising between.
 fn within<R: Real>(chain: &Chain<R>, mut at: [R; 2], mut links: [Link<R>; 2]) -> Link<R> {
     let wanted = chain.task.distance;
     let t = &chain.task;
-    let joint = (t.a_up * t.a_up - chain.c).root();
+    let joint = joint(chain);
     // Where a hold begins or ends the curve changes its formula; near its start it is told by the distance from there,
     // further on by z.
     let begin = chain.begin();

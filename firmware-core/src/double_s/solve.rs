@@ -13,11 +13,11 @@ pub(super) const PARTS: usize = 7;
 /// A motion of a chain, and how the chain looks at the task.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Solution<R> {
-    task: Task<R>,
-    link: Link<R>,
-    cruise: Option<R>,
-    mirrored: bool,
-    reversed: bool,
+    pub(super) task: Task<R>,
+    pub(super) link: Link<R>,
+    pub(super) cruise: Option<R>,
+    pub(super) mirrored: bool,
+    pub(super) reversed: bool,
 }
 
 /// The fastest motion that covers the task's distance. Start and target are within their limits.
@@ -43,7 +43,7 @@ pub(super) fn quickest<R: Real>(task: &Task<R>) -> Solution<R> {
 }
 
 /// The task seen so that the velocity left without accelerations rises, and whether in a mirror.
-fn upright<R: Real>(task: &Task<R>) -> (Task<R>, bool) {
+pub(super) fn upright<R: Real>(task: &Task<R>) -> (Task<R>, bool) {
     let mirrored = task.start_velocity() < task.stop_velocity();
     (if mirrored { task.mirrored() } else { *task }, mirrored)
 }
@@ -61,9 +61,20 @@ fn directed<R: Real>(task: Task<R>, range: impl Fn(&Chain<R>) -> R) -> (Task<R>,
     }
 }
 
-/// A motion on which the acceleration never returns to zero: where both accelerations point against the change of
-/// velocity that is left without them, such motions are apart from all others, and faster.
+/// A motion on which the acceleration never returns to zero, if there is one: it is faster than all others.
 fn island<R: Real>(upright: &Task<R>, mirrored: bool) -> Option<Solution<R>> {
+    match directed(island_task(upright)?, island_range) {
+        (task, reversed, Place::At(link)) => {
+            Some(Solution { task, link, cruise: None, mirrored: !mirrored, reversed })
+        }
+        (_, _, Place::Before(_) | Place::Beyond(_)) => None,
+    }
+}
+
+/// The task seen so that its chain is one of motions on which the acceleration never returns to zero: where both
+/// accelerations point against the change of velocity that is left without them, such motions may exist, apart from
+/// all others.
+pub(super) fn island_task<R: Real>(upright: &Task<R>) -> Option<Task<R>> {
     if !(upright.a0 < R::ZERO && upright.a1 < R::ZERO) {
         return None;
     }
@@ -72,20 +83,13 @@ fn island<R: Real>(upright: &Task<R>, mirrored: bool) -> Option<Solution<R>> {
     let least = if difference > R::ZERO { difference / task.j_up } else { -difference / task.j_down };
     let gained = task.k() * (task.a0 * task.a0 + task.a1 * task.a1);
     let rounding = R::whole(8) * R::ULP * task.v0.abs().most(task.v1.abs()).most(gained);
-    if task.v1 - task.v0 < least - rounding {
-        return None;
-    }
-    // Up to where the first extremum is the start itself.
-    let range = |chain: &Chain<R>| {
-        let start = chain.task.a0 * chain.task.a0 - chain.c;
-        (-start.root() - chain.begin()).most(R::ZERO)
-    };
-    match directed(task, range) {
-        (task, reversed, Place::At(link)) => {
-            Some(Solution { task, link, cruise: None, mirrored: !mirrored, reversed })
-        }
-        (_, _, Place::Before(_) | Place::Beyond(_)) => None,
-    }
+    (task.v1 - task.v0 >= least - rounding).then_some(task)
+}
+
+/// How far the chain of such a task goes: to where the first extremum is the start itself.
+pub(super) fn island_range<R: Real>(chain: &Chain<R>) -> R {
+    let start = chain.task.a0 * chain.task.a0 - chain.c;
+    (-start.root() - chain.begin()).most(R::ZERO)
 }
 
 impl<R: Real> Solution<R> {

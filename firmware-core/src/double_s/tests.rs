@@ -6,6 +6,8 @@ use proptest::prelude::*;
 
 use super::*;
 
+mod timed;
+
 /// Random numbers over decades, the same on every run.
 struct Chance(fastrand::Rng);
 
