@@ -16,7 +16,8 @@ pub struct Cli {
 }
 
 const EXIT_CODES: &str = "\
-Exit status: 0 done and certified, 1 the certificate does not hold or an internal error, 2 bad input or usage, 130 interrupted.
+Exit status: 0 done and certified, 1 the certificate does not hold or an internal error, 2 bad input, an impossible move or
+usage, 130 interrupted.
 
 Example: feedspline run jobs/cat.ngc";
 
@@ -29,6 +30,8 @@ pub enum Verb {
     Run(RunArgs),
     /// Plan a job by several methods and show them side by side
     Compare(CompareArgs),
+    /// Plan the fastest motion of axes from state to state
+    Move(MoveArgs),
     /// Write a sample way-point job
     Sample(SampleArgs),
     /// Prove a feed table against the limits it carries
@@ -53,6 +56,7 @@ impl Verb {
             Verb::Plan(args) => args.speech.talk(),
             Verb::Run(args) => args.plan.speech.talk(),
             Verb::Compare(args) => args.speech.talk(),
+            Verb::Move(args) => args.speech.talk(),
             Verb::Sample(args) => args.speech.talk(),
             Verb::Verify(args) => args.speech.talk(),
             Verb::Inspect(args) => args.speech.talk(),
@@ -228,6 +232,87 @@ pub struct CompareArgs {
     /// What to say.
     #[command(flatten)]
     pub speech: Speech,
+}
+
+/// `feedspline move`.
+#[derive(Args, Clone, Debug, Default)]
+#[command(after_help = "\
+Positions in any unit, the others in that unit per second to the first, second and third. Limits are kept at every instant; a
+start outside of them is led back first. Without p1 the target is the velocity v1, wherever it is reached.
+
+A file names its columns in the first line: p0 v0 a0 p1 v1 a1 vmax amax jmax, and vmin amin jmin where limits are not symmetric;
+with _0, _1 and so on for several axes, which wait for each other as the column sync says (none, time or phase).
+
+Example: feedspline move --p0 0 --p1 10 --vmax 5 --amax 20 --jmax 200
+         feedspline move moves.csv --sync time --json")]
+pub struct MoveArgs {
+    /// A file of moves, one a line
+    #[arg(value_name = "MOVES.csv", conflicts_with_all = ["p0", "v0", "a0", "p1", "v1", "a1", "vmax", "amax", "jmax", "vmin", "amin", "jmin"])]
+    pub file: Option<PathBuf>,
+    /// Position at the start
+    #[arg(long, value_name = "P", allow_negative_numbers = true)]
+    pub p0: Option<f64>,
+    /// Velocity at the start [default: 0]
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    pub v0: Option<f64>,
+    /// Acceleration at the start [default: 0]
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    pub a0: Option<f64>,
+    /// Position at the end; without it the target is a velocity
+    #[arg(long, value_name = "P", allow_negative_numbers = true)]
+    pub p1: Option<f64>,
+    /// Velocity at the end [default: 0]
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    pub v1: Option<f64>,
+    /// Acceleration at the end [default: 0]
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    pub a1: Option<f64>,
+    /// Largest velocity
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    pub vmax: Option<f64>,
+    /// Largest acceleration
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    pub amax: Option<f64>,
+    /// Largest jerk
+    #[arg(long, value_name = "J", allow_negative_numbers = true)]
+    pub jmax: Option<f64>,
+    /// Smallest velocity [default: -vmax]
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    pub vmin: Option<f64>,
+    /// Smallest acceleration [default: -amax]
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    pub amin: Option<f64>,
+    /// Smallest jerk [default: -jmax]
+    #[arg(long, value_name = "J", allow_negative_numbers = true)]
+    pub jmin: Option<f64>,
+    /// How axes wait for each other, unless a column says so
+    #[arg(long, value_enum, default_value_t, value_name = "HOW")]
+    pub sync: Sync,
+    /// What to say.
+    #[command(flatten)]
+    pub speech: Speech,
+}
+
+/// How axes wait for each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Sync {
+    /// Not at all
+    #[default]
+    None,
+    /// They arrive at the same time
+    Time,
+    /// They keep to one line if their states allow it, else they arrive at the same time
+    Phase,
+}
+
+impl From<Sync> for host_sim::group::Sync {
+    fn from(sync: Sync) -> Self {
+        match sync {
+            Sync::None => host_sim::group::Sync::None,
+            Sync::Time => host_sim::group::Sync::Time,
+            Sync::Phase => host_sim::group::Sync::Phase,
+        }
+    }
 }
 
 /// `feedspline sample`.

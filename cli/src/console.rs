@@ -101,6 +101,11 @@ impl<'a> Console<'a> {
         }
     }
 
+    /// Says what the exit status is about on standard error.
+    pub fn warn(&mut self, text: &str) {
+        self.tell(text);
+    }
+
     /// Writes to standard error; when that fails there is nobody left to tell.
     fn tell(&mut self, text: &str) {
         let _ = self.err.write_all(text.as_bytes()).and_then(|()| self.err.flush());

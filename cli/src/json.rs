@@ -10,8 +10,10 @@ use serde::Serialize;
 use crate::failure::{Blame, Failure};
 
 mod compare;
+mod motion;
 
 pub use compare::{CompareFilesJson, CompareJson, MethodJson, MethodState};
+pub use motion::{MoveAxisJson, MoveErrorJson, MoveJson, PhaseJson, StateJson, sync_name};
 
 /// The object of `plan` and `run`, also written as plan.json.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -12,6 +12,7 @@ pub mod interrupt;
 pub mod json;
 pub mod local;
 pub mod memory;
+pub mod moves;
 pub mod output;
 pub mod progress;
 pub mod report;
@@ -57,6 +58,7 @@ pub fn status(
         Verb::Plan(args) => verbs::plan::execute(args, engine, &mut console),
         Verb::Run(args) => verbs::run::execute(args, engine, &mut console),
         Verb::Compare(args) => verbs::compare::execute(args, engine, &mut console),
+        Verb::Move(args) => verbs::motion::execute(args, &mut console),
         Verb::Sample(args) => verbs::sample::execute(args, &mut console),
         Verb::Verify(args) => verbs::verify::execute(args, engine, &mut console),
         Verb::Inspect(args) => verbs::inspect::execute(args, engine, &mut console),
@@ -64,6 +66,7 @@ pub fn status(
     match result {
         Ok(verbs::Verdict::Holds) => 0,
         Ok(verbs::Verdict::Broken) => EXIT_FAILED,
+        Ok(verbs::Verdict::Refused) => EXIT_BAD_INPUT,
         Err(failure) => {
             console.fail(&failure);
             failure.exit_status()

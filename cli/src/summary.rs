@@ -1,8 +1,8 @@
 //! What a verb prints for people: one aligned column of names, one of values.
 
 use crate::json::{
-    BusJson, CertificateJson, CompareJson, InspectJson, MethodJson, MethodState, PlanJson, SampleJson,
-    VerifyJson,
+    BusJson, CertificateJson, CompareJson, InspectJson, MethodJson, MethodState, MoveJson, PhaseJson,
+    PlanJson, SampleJson, StateJson, VerifyJson,
 };
 use crate::report::compare::{change, seconds};
 use crate::report::words::{bytes, count, duration, length, percent, small, times};
@@ -125,6 +125,61 @@ pub fn sample(written: &SampleJson) -> String {
     s.row("way-points", &count(written.points));
     s.row("size", &bytes(written.file_bytes));
     s.text
+}
+
+/// One row of `move`.
+pub fn motion(m: &MoveJson) -> String {
+    let mut text = format!("row {}", m.row);
+    if let Some(error) = &m.error {
+        let axis = error.axis.as_ref().map(|a| format!("axis {a}: ")).unwrap_or_default();
+        return format!("{text}, line {}: {axis}{}: {}\n", m.line, error.name, error.message);
+    }
+    let (seconds, sync) = (m.duration_s.unwrap_or_default(), m.sync.unwrap_or_default());
+    text.push_str(&format!(": {seconds:.6} s"));
+    if let Some(phases) = &m.phases {
+        text.push('\n');
+        text.push_str(&table(phases));
+    }
+    if m.axes.is_some() {
+        text.push_str(&format!(", sync {sync}\n"));
+    }
+    for axis in m.axes.iter().flatten() {
+        let name = printable(&axis.axis);
+        text.push_str(&format!("  axis {name}: {:.6} s\n{}", axis.duration_s, table(&axis.phases)));
+    }
+    text
+}
+
+/// Phases, one a line.
+fn table(phases: &[PhaseJson]) -> String {
+    let head = ["seconds", "jerk", "from position", "velocity", "acceleration"];
+    let mut text =
+        format!("    {:>12} {:>14} {:>16} {:>14} {:>14}\n", head[0], head[1], head[2], head[3], head[4]);
+    for p in phases {
+        let StateJson { position, velocity, acceleration } = p.start;
+        text.push_str(&format!(
+            "    {:>12.6} {:>14} {:>16} {:>14} {:>14}\n",
+            p.duration_s,
+            digits(p.jerk),
+            digits(position),
+            digits(velocity),
+            digits(acceleration)
+        ));
+    }
+    text
+}
+
+/// Six digits, whatever the size.
+fn digits(x: f64) -> String {
+    let size = x.abs();
+    if x == 0.0 {
+        "0".into()
+    } else if (1e-3..1e7).contains(&size) {
+        let before = size.log10().floor() as i32 + 1;
+        format!("{x:.*}", (6 - before).clamp(0, 8) as usize)
+    } else {
+        format!("{x:.5e}")
+    }
 }
 
 /// The summary of `verify`.

@@ -1,9 +1,9 @@
 //! Axes that move from state to state together, planned on the host: each on its own, all in the same time, or all on one
 //! line.
 
-use firmware_core::double_s::{
-    self, Bounds, DoubleSError, MOST_EDGES, MotionLimits, Profile, Segment, State, Timed,
-};
+use firmware_core::double_s::{self, MOST_EDGES, Profile, Timed};
+
+pub use firmware_core::double_s::{Bounds, DoubleSError, MotionLimits, Quantity, Segment, State};
 
 /// How axes wait for each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

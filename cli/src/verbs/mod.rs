@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod inspect;
+pub mod motion;
 pub mod plan;
 pub mod run;
 pub mod sample;
@@ -14,6 +15,8 @@ pub enum Verdict {
     Holds,
     /// Done, but the certificate does not hold.
     Broken,
+    /// Done as far as the input allows, and told what it does not.
+    Refused,
 }
 
 impl Verdict {
