@@ -5,6 +5,8 @@ mod compare;
 #[cfg(test)]
 mod local;
 #[cfg(test)]
+mod moves;
+#[cfg(test)]
 mod points;
 #[cfg(test)]
 mod report;

@@ -325,6 +325,11 @@ fn the_documentation_explains_every_field_and_no_other() {
     fields(&json(&say(&GOOD, &["verify", "a.feed", "--json"])), &mut found);
     fields(&json(&say(&GOOD, &["inspect", "a.feed", "--json"])), &mut found);
     fields(&json(&say(&BAD_INPUT, &["plan", "part.ngc", "--json", "-o", folder])), &mut found);
+    let file = home.path().join("moves.csv");
+    fs::write(&file, super::moves::PAIRS).unwrap();
+    fields(&json(&say(&GOOD, &["move", file.to_str().unwrap(), "--json"])), &mut found);
+    let one = ["--p0", "0", "--p1", "1", "--vmax", "1", "--amax", "1", "--jmax", "1"];
+    fields(&json(&say(&GOOD, &[&["move", "--json"][..], &one].concat())), &mut found);
     for name in &found {
         assert!(text.contains(&format!("`{name}`")), "docs/json.md does not explain {name}");
     }
