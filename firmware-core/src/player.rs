@@ -6,8 +6,9 @@
 //! to rest on its path.
 
 use heapless::Deque;
-use protocol::message::{DriveMessage, Fault, HostMessage, Reject, State, Status};
-use protocol::table::{Limits, TableHeader};
+use protocol::message::{DriveMessage, Fault, HostMessage, Identity, Reject, State, Status};
+use protocol::schema;
+use protocol::table::{FORMAT_VERSION, Limits, TableHeader};
 
 use crate::evaluate::{Cursor, Setpoint};
 use crate::store::Slot;
@@ -15,6 +16,21 @@ use crate::time::{PathClock, ticks_until};
 
 /// Most answers that wait to be sent; when they are not fetched, status is dropped first.
 const ANSWERS: usize = 8;
+
+/// Version of this core.
+const VERSION: [u8; 3] = [
+    number(env!("CARGO_PKG_VERSION_MAJOR")),
+    number(env!("CARGO_PKG_VERSION_MINOR")),
+    number(env!("CARGO_PKG_VERSION_PATCH")),
+];
+
+/// What digits stand for, as far as eight bits go.
+const fn number(digits: &str) -> u8 {
+    match u8::from_str_radix(digits, 10) {
+        Ok(number) => number,
+        Err(_) => u8::MAX,
+    }
+}
 
 /// What a drive knows of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,6 +128,11 @@ impl<'a> Player<'a> {
                 self.clear_unused();
                 return;
             }
+            HostMessage::Identify => {
+                let identity = self.identity();
+                self.answer(DriveMessage::Identity(identity));
+                return;
+            }
         };
         if let Err(reason) = result {
             self.answer(DriveMessage::Reject { table, reason });
@@ -164,6 +185,15 @@ impl<'a> Player<'a> {
             position: self.position,
             fill: after(end),
         }
+    }
+
+    /// Who the axis is.
+    pub fn identity(&self) -> Identity {
+        let AxisConfig { axis, tick_ns, limits, .. } = self.config;
+        let room = self.a.room().min(self.b.room());
+        let room = u32::try_from(room).unwrap_or(u32::MAX);
+        let (format, schema) = (FORMAT_VERSION, schema::HASH);
+        Identity { version: VERSION, format, schema, axis, tick_ns, limits, room }
     }
 
     fn state(&self) -> State {

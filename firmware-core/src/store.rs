@@ -36,6 +36,11 @@ impl<'a> Slot<'a> {
         Self { memory, table: None }
     }
 
+    /// Bytes there are for a table.
+    pub(crate) fn room(&self) -> usize {
+        self.memory.len()
+    }
+
     /// Number of the table in it.
     pub(crate) fn number(&self) -> Option<u32> {
         self.table.map(|t| t.header.table)

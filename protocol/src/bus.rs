@@ -4,6 +4,7 @@ mod frame;
 pub mod ids;
 mod reassembly;
 mod segment;
+pub mod slcan;
 
 pub use frame::{Frame, FrameSize};
 pub use ids::Node;

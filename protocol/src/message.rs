@@ -5,7 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::bus::MESSAGE_BYTES;
-use crate::table::{AxisHeader, TableError, TableHeader};
+use crate::table::{AxisHeader, Limits, TableError, TableHeader};
 
 /// Most table bytes of one [`HostMessage::Data`]; with all its other fields it then fits a block.
 pub const DATA_BYTES: usize = 312;
@@ -49,6 +49,8 @@ pub enum HostMessage<'a> {
     /// Nothing starts any more: armed and received tables are forgotten. A table that plays goes on to its end,
     /// which is at rest.
     Stop,
+    /// Who is there? Every drive that hears it answers [`DriveMessage::Identity`], whatever its state.
+    Identify,
 }
 
 /// A part of a table.
@@ -81,6 +83,27 @@ pub enum DriveMessage {
     },
     /// How the drive is.
     Status(Status),
+    /// Who the drive is.
+    Identity(Identity),
+}
+
+/// What a drive tells of itself before anything else is said.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Version of its core: major, minor, patch.
+    pub version: [u8; 3],
+    /// Table format it plays.
+    pub format: u8,
+    /// Schema hash of its messages ([`crate::schema::HASH`]).
+    pub schema: u64,
+    /// Its axis, in the machine's order.
+    pub axis: u8,
+    /// Its control tick [ns].
+    pub tick_ns: u32,
+    /// Tables planned for more are refused.
+    pub limits: Limits,
+    /// Room for one table [bytes]; it holds two.
+    pub room: u32,
 }
 
 /// How a drive is.

@@ -1,5 +1,6 @@
 //! One front door for building, checking and measuring: `cargo xtask <word>`.
 
+mod firmware;
 mod names;
 mod peers;
 mod real;
@@ -43,6 +44,8 @@ enum Word {
     Doc,
     /// What a change has to pass before it goes in: test, doc and a release build
     Ci,
+    /// Build the drive's images, hold them to their gates, and prove that an emulated Cortex-M4F computes the same bits
+    Firmware,
     /// Check that what docs/architecture.md and the README name exists
     Names,
     /// Plan many random paths under random limits and check every plan
@@ -81,6 +84,7 @@ fn main() -> ExitCode {
             ("doc", &|| doc(&root)),
             ("release build", &|| cargo(&root, &["build", "--release"])),
         ]),
+        Word::Firmware => firmware::run(&root),
         Word::Names => names::check(&root),
         Word::RandomPaths { count, seed, from } => random_paths(&root, count, seed, from),
         Word::Real { dir, machine } => real::table(&root, &dir, machine.as_deref()),
@@ -144,5 +148,6 @@ fn test(root: &Path) -> Step {
         ("lints", &|| lint(root)),
         ("names", &|| names::check(root)),
         ("tests", &|| tests::run(root)),
+        ("firmware", &|| firmware::run(root)),
     ])
 }

@@ -2,10 +2,23 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::sync::Mutex;
 use std::time::Instant;
 
 /// How a step ended; an error says what failed.
 pub(crate) type Step = Result<(), String>;
+
+/// What could not be done for want of something outside, and what that is.
+static SKIPPED: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+/// Says that something is left out, now and in the table at the end.
+pub(crate) fn skip(what: &str, reason: &str) {
+    let line = format!("SKIPPED {what}: {reason}");
+    eprintln!("{line}");
+    if let Ok(mut all) = SKIPPED.lock() {
+        all.push(line);
+    }
+}
 
 /// Runs cargo in the workspace.
 pub(crate) fn cargo(root: &Path, args: &[&str]) -> Step {
@@ -48,5 +61,10 @@ pub(crate) fn run_all(steps: &[(&str, &dyn Fn() -> Step)]) -> Step {
         }
     }
     eprintln!("\n{}", lines.join("\n"));
+    if let Ok(skipped) = SKIPPED.lock().as_deref()
+        && !skipped.is_empty()
+    {
+        eprintln!("  {} left out: {}", skipped.len(), skipped.join("; "));
+    }
     if failed.is_empty() { Ok(()) } else { Err(format!("failed: {}", failed.join(", "))) }
 }

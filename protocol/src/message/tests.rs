@@ -38,7 +38,7 @@ const AXIS: AxisHeader = AxisHeader {
 fn host_messages_are_pinned() {
     let data = HostMessage::Data { table: 300, part: Part::Axis, offset: 5, bytes: &[7, 8] };
     let seal = HostMessage::Seal { table: 1, part: Part::Shared, crc: 0x80 };
-    let cases: [(HostMessage<'_>, &[u8]); 6] = [
+    let cases: [(HostMessage<'_>, &[u8]); 7] = [
         (HostMessage::Open(HEADER), &[0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10]),
         (
             HostMessage::OpenAxis(AXIS),
@@ -48,6 +48,7 @@ fn host_messages_are_pinned() {
         (seal, &[3, 1, 0, 0x80, 1]),
         (HostMessage::Start { table: 1, tick: 1000 }, &[4, 1, 0xe8, 7]),
         (HostMessage::Stop, &[5]),
+        (HostMessage::Identify, &[6]),
     ];
     for (message, golden) in cases {
         assert_eq!(bytes(&message), golden, "{message:?}");
@@ -61,7 +62,23 @@ fn drive_messages_are_pinned() {
     let bend = TableError::Bend { index: 9 };
     let truncated = TableError::Truncated { stream: Stream::Controls, index: 200 };
     let status = |state, fault| DriveMessage::Status(Status { state, fault, tick: 1, position: -2, fill: 3 });
-    let cases: [(DriveMessage, &[u8]); 22] = [
+    let identity = Identity {
+        version: [0, 1, 2],
+        format: 1,
+        schema: 300,
+        axis: 2,
+        tick_ns: 1000,
+        limits: AXIS.limits,
+        room: 4096,
+    };
+    let cases: [(DriveMessage, &[u8]); 23] = [
+        (
+            DriveMessage::Identity(identity),
+            &[
+                3, 0, 1, 2, 1, 0xac, 2, 2, 0xe8, 7, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x40, 1, 0, 0, 0x80, 0x40,
+                0x80, 0x20,
+            ],
+        ),
         (DriveMessage::Ready { table: 1, ticks: 200, crc: [1, 2] }, &[0, 1, 0xc8, 1, 1, 2]),
         (reject(Reject::Table(bend)), &[1, 1, 0, 7, 9]),
         (reject(Reject::Table(truncated)), &[1, 1, 0, 1, 2, 0xc8, 1]),

@@ -1,0 +1,8 @@
+//! What both images need of the board.
+#![no_std]
+
+pub mod uart;
+pub mod workload;
+
+/// The core's clock [Hz], also SysTick's.
+pub const CLOCK_HZ: u32 = 25_000_000;

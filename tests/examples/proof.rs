@@ -1,0 +1,67 @@
+//! The host's side of the proof that the drive core computes the same bits on a Cortex-M: writes the tables that the proof
+//! image carries, and prints what they and random motions come to here.
+//!
+//!     cargo run --release -p tests --example proof -- TABLES
+#![allow(clippy::expect_used, clippy::print_stdout, reason = "a program that stops on an error")]
+
+use std::{env, fs};
+
+use planner::feed::pack::{AxisScale, pack};
+use planner::job::gcode::Options;
+use planner::job::machine::{LimitSet, Machine};
+use serde::Serialize;
+use tests::chain;
+
+#[allow(unreachable_pub, reason = "the image uses it from outside")]
+#[path = "../../firmware/emulated/src/workload.rs"]
+mod workload;
+
+const MACHINE: &str = include_str!("../../jobs/mill3.toml");
+const PROGRAM: &str = include_str!("../../jobs/cat.ngc");
+
+/// Control tick [ns]: more than a million set-points.
+const TICK_NS: u32 = 100_000;
+/// As many as the image plans.
+const MOVES: u32 = 100_000;
+
+fn part(to: &mut Vec<u8>, bytes: &[u8]) {
+    to.extend((bytes.len() as u32).to_le_bytes());
+    to.extend(bytes);
+}
+
+fn header(to: &mut Vec<u8>, header: &impl Serialize) {
+    let mut buffer = [0u8; 64];
+    part(to, protocol::message::encode(header, &mut buffer).expect("headers are short"));
+}
+
+fn main() {
+    let path = env::args_os().nth(1).expect("the file to write the tables to");
+    let machine = Machine::from_toml(MACHINE, "mill3.toml").expect("the sample machine is sound");
+    let job = chain::plan(PROGRAM.as_bytes(), &machine, &Options::default(), LimitSet::default())
+        .expect("the sample program has a plan");
+    let mut tables = Vec::new();
+    for (number, section) in job.plan.sections().enumerate() {
+        let scales: Vec<AxisScale> = machine
+            .axes
+            .iter()
+            .zip(&section.limits)
+            .map(|(axis, &limits)| AxisScale { counts_per_unit: axis.counts_per_unit, limits })
+            .collect();
+        let packed =
+            pack(&section.table, number as u32, TICK_NS, &scales).expect("what is planned can be packed");
+        for axis in &packed.axes {
+            header(&mut tables, &packed.header);
+            header(&mut tables, &axis.header);
+            part(&mut tables, &packed.shared);
+            part(&mut tables, &axis.controls);
+        }
+    }
+    fs::write(path, &tables).expect("the tables can be written");
+    let played = workload::play(&tables, |_, work| work()).expect("what the planner packs, a drive accepts");
+    let planned = workload::plan_moves(MOVES, |work| work());
+    println!("setpoints {}", played.setpoints);
+    println!("setpoint_hash {}", played.hash);
+    println!("plans {}", planned.plans);
+    println!("imprecise {}", planned.imprecise);
+    println!("plan_hash {}", planned.hash);
+}
