@@ -38,6 +38,8 @@ pub enum Verb {
     Verify(VerifyArgs),
     /// Show what is in a feed table
     Inspect(InspectArgs),
+    /// Build a drive's image, put it where it runs, and ask it who it is
+    Flash(FlashArgs),
 }
 
 /// How much a verb says, and to whom.
@@ -60,6 +62,7 @@ impl Verb {
             Verb::Sample(args) => args.speech.talk(),
             Verb::Verify(args) => args.speech.talk(),
             Verb::Inspect(args) => args.speech.talk(),
+            Verb::Flash(args) => args.speech.talk(),
         }
     }
 }
@@ -358,6 +361,34 @@ pub struct InspectArgs {
     /// What to say.
     #[command(flatten)]
     pub speech: Speech,
+}
+
+/// `feedspline flash`.
+#[derive(Args, Clone, Debug)]
+#[command(after_help = "\
+The image is built with cargo from firmware/, here or in a folder above.
+
+Example: feedspline flash --board emulated")]
+pub struct FlashArgs {
+    /// Where it runs
+    #[arg(long, value_enum, value_name = "NAME")]
+    pub board: Board,
+    /// The drive's address; the axis is the one before it
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=127))]
+    pub node: u8,
+    /// A finished image, instead of building one
+    #[arg(long, value_name = "FILE")]
+    pub image: Option<PathBuf>,
+    /// What to say.
+    #[command(flatten)]
+    pub speech: Speech,
+}
+
+/// Where a drive's image runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Board {
+    /// A Cortex-M4F in the emulator QEMU
+    Emulated,
 }
 
 /// Which axis limits a plan keeps.

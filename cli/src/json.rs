@@ -10,9 +10,11 @@ use serde::Serialize;
 use crate::failure::{Blame, Failure};
 
 mod compare;
+mod flash;
 mod motion;
 
 pub use compare::{CompareFilesJson, CompareJson, MethodJson, MethodState};
+pub use flash::{DriveLimitsJson, FlashJson};
 pub use motion::{MoveAxisJson, MoveErrorJson, MoveJson, PhaseJson, StateJson, sync_name};
 
 /// The object of `plan` and `run`, also written as plan.json.

@@ -59,6 +59,7 @@ pub fn status(
         Verb::Run(args) => verbs::run::execute(args, engine, &mut console),
         Verb::Compare(args) => verbs::compare::execute(args, engine, &mut console),
         Verb::Move(args) => verbs::motion::execute(args, &mut console),
+        Verb::Flash(args) => verbs::flash::execute(args, &mut console),
         Verb::Sample(args) => verbs::sample::execute(args, &mut console),
         Verb::Verify(args) => verbs::verify::execute(args, engine, &mut console),
         Verb::Inspect(args) => verbs::inspect::execute(args, engine, &mut console),

@@ -1,8 +1,8 @@
 //! What a verb prints for people: one aligned column of names, one of values.
 
 use crate::json::{
-    BusJson, CertificateJson, CompareJson, InspectJson, MethodJson, MethodState, MoveJson, PhaseJson,
-    PlanJson, SampleJson, StateJson, VerifyJson,
+    BusJson, CertificateJson, CompareJson, DriveLimitsJson, FlashJson, InspectJson, MethodJson, MethodState,
+    MoveJson, PhaseJson, PlanJson, SampleJson, StateJson, VerifyJson,
 };
 use crate::report::compare::{change, seconds};
 use crate::report::words::{bytes, count, duration, length, percent, small, times};
@@ -180,6 +180,22 @@ fn digits(x: f64) -> String {
     } else {
         format!("{x:.5e}")
     }
+}
+
+/// The summary of `flash`.
+pub fn flash(f: &FlashJson) -> String {
+    let mut s = Sheet::new(&format!("drive {} on the board {}", f.node, f.board));
+    s.row("image", &f.image);
+    s.row("core", &format!("{}, table format {}", f.core_version, f.format_version));
+    let same = if f.schema_matches { "the host's" } else { "NOT the host's" };
+    s.row("protocol", &format!("{}, {same}", f.schema_hash));
+    s.row("axis", &format!("{}, control tick {}", f.axis, duration(f.control_tick_s)));
+    let DriveLimitsJson { velocity_counts_s: v, acceleration_counts_s2: a, jerk_counts_s3: j } =
+        f.drive_limits;
+    let jerk = j.map_or("no jerk limit".into(), |j| format!("{j:e} counts/s^3"));
+    s.row("limits", &format!("{v:e} counts/s, {a:e} counts/s^2, {jerk}"));
+    s.row("room for a table", &bytes(u64::from(f.table_room_bytes)));
+    s.text
 }
 
 /// The summary of `verify`.

@@ -10,6 +10,7 @@ pub mod axis_loop;
 pub mod axis_scale;
 pub mod bus;
 pub mod drive_node;
+pub mod emulator;
 pub mod encoder;
 pub mod group;
 pub mod host_node;

@@ -1,6 +1,7 @@
 //! One file per verb.
 
 pub mod compare;
+pub mod flash;
 pub mod inspect;
 pub mod motion;
 pub mod plan;
