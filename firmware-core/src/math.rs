@@ -1,8 +1,15 @@
 //! The few functions beyond + - * / that the core needs.
 
 /// Square root, correctly rounded as IEEE 754 asks: the same bits wherever it runs.
+#[cfg(not(all(target_arch = "arm", target_abi = "eabihf")))]
 pub(crate) fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)
+}
+
+/// Square root, correctly rounded as IEEE 754 asks, by the instruction that the floating-point unit has for it.
+#[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+pub(crate) fn sqrt(x: f32) -> f32 {
+    vfp::sqrt(x)
 }
 
 /// The nearest integer, halves up; saturates, and NaN gives 0.
