@@ -6,7 +6,7 @@
 mod law;
 mod piece;
 
-pub(crate) use law::LawCursor;
+pub(crate) use law::{LawCursor, Stretch};
 pub(crate) use piece::PieceCursor;
 
 use protocol::checksum::Fnv64;

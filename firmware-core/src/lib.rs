@@ -13,6 +13,7 @@ pub mod drive;
 pub mod evaluate;
 mod math;
 pub mod player;
+pub mod proof;
 mod store;
 pub mod table;
 pub mod time;

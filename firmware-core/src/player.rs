@@ -43,6 +43,8 @@ pub struct AxisConfig {
     pub position: i64,
     /// Tables planned for more are refused.
     pub limits: Limits,
+    /// Lowest and highest position that a table may lead to [counts]; none: anywhere.
+    pub travel: Option<[i64; 2]>,
     /// Status is sent every so many ticks; 0: never.
     pub status_ticks: u32,
 }
@@ -293,7 +295,7 @@ impl<'a> Player<'a> {
             if axis.start != position {
                 return Err(Reject::Position { position });
             }
-            let ticks = ticks_until(slot.check()?.duration(), config.tick_ns);
+            let ticks = ticks_until(slot.check(config.travel)?.duration(), config.tick_ns);
             let crc = slot.seals().ok_or(Reject::NotReady)?;
             Ok(DriveMessage::Ready { table: number, ticks, crc })
         };

@@ -120,9 +120,9 @@ impl<'a> Slot<'a> {
         Ok(table.is_complete())
     }
 
-    /// Checks a complete table.
-    pub(crate) fn check(&mut self) -> Result<CheckedTable<'_>, Reject> {
-        let duration = self.view().ok_or(Reject::NotOpen)?.check().map_err(Reject::Table)?.duration();
+    /// Checks a complete table, and proves that it keeps its limits and stays within `travel`.
+    pub(crate) fn check(&mut self, travel: Option<[i64; 2]>) -> Result<CheckedTable<'_>, Reject> {
+        let duration = self.view().ok_or(Reject::NotOpen)?.prove(travel).map_err(Reject::Table)?.duration();
         if let Some(table) = &mut self.table {
             table.checked = Some(duration);
         }

@@ -1,10 +1,14 @@
 //! The one door for tables: bytes in, a checked table or a named error out.
 
 use protocol::table::rules::{MAX_SPANS_PER_TICK, nearest_count};
-use protocol::table::{AxisHeader, HeaderField, Stream, TableError, TableHeader};
+use protocol::table::{AxisHeader, AxisLimit, HeaderField, Stream, TableError, TableHeader};
 
-use crate::evaluate::{LawCursor, PieceCursor};
+use crate::evaluate::{LawCursor, PieceCursor, Stretch};
+use crate::proof::Granted;
 use crate::time::tick_time;
+
+/// What a position may be outside the travel by, for the rounding of the proof [counts].
+const SLACK: i64 = 1;
 
 /// A table as it lies in memory: headers, and the streams they describe.
 #[derive(Clone, Copy, Debug)]
@@ -58,14 +62,49 @@ impl<'a> TableView<'a> {
     /// # Errors
     /// The first rule that is broken, and where.
     pub fn check(self) -> Result<CheckedTable<'a>, TableError> {
+        self.pass(|_, _, _| Ok(()))
+    }
+
+    /// As [`TableView::check`], and proves on the way that the axis keeps the limits that the table declares, at every
+    /// instant, and stays within `travel` [counts].
+    ///
+    /// # Errors
+    /// The first rule that is broken, or the first span on which a limit cannot be proven ([`crate::proof`]).
+    pub fn prove(self, travel: Option<[i64; 2]>) -> Result<CheckedTable<'a>, TableError> {
+        let granted = Granted::new(&self.axis.limits);
+        self.pass(|law, piece, offset| {
+            let failed = |limit| TableError::Limit { limit, index: law.index() };
+            let proven = match law.stretch(&self) {
+                Stretch::Launch(rest) => granted.rest(&piece.slopes(offset, rest.h), &rest),
+                Stretch::Between(speed) => granted.span(&piece.slopes(offset, speed.h), &speed),
+                Stretch::Landing(rest) => granted.rest(&piece.slopes_before_end(rest.h), &rest),
+            };
+            proven.map_err(failed)?;
+            match travel {
+                Some([low, high]) if offset == 0.0 => {
+                    let [least, most] = piece.hull(&self);
+                    let inside = low <= least.saturating_add(SLACK) && most.saturating_sub(SLACK) <= high;
+                    if inside { Ok(()) } else { Err(failed(AxisLimit::Travel)) }
+                }
+                _ => Ok(()),
+            }
+        })
+    }
+
+    /// Goes through the whole table, and lets `judge` see every span: its law, its piece, and where it begins on it [u].
+    fn pass(
+        self,
+        judge: impl Fn(&LawCursor, &PieceCursor, f32) -> Result<(), TableError>,
+    ) -> Result<CheckedTable<'a>, TableError> {
         let shortest = tick_time(self.header.tick_ns) / MAX_SPANS_PER_TICK;
         let mut piece = PieceCursor::start(&self)?;
         if nearest_count(piece.first_point(), self.axis.fraction_bits) != self.axis.start {
             return Err(TableError::Start);
         }
         let mut law = LawCursor::start(&self)?;
-        let mut duration = 0u64;
+        let (mut duration, mut offset) = (0u64, 0u32);
         loop {
+            judge(&law, &piece, offset as f32 * self.header.step())?;
             if law.duration() < shortest {
                 return Err(TableError::Fast { index: law.index() });
             }
@@ -73,9 +112,13 @@ impl<'a> TableView<'a> {
             if law.is_last() {
                 break;
             }
+            let step = law.step();
             law.advance(&self)?;
             if law.opens_geometry() {
                 piece.advance(&self)?;
+                offset = 0;
+            } else {
+                offset = offset.saturating_add(step);
             }
         }
         law.finish(&self)?;

@@ -232,6 +232,8 @@ impl<'a> Programme<'a> {
                 tick_ns: self.tick_ns,
                 position: self.origin[axis],
                 limits: limits_in_counts(&limits, a.counts_per_unit),
+                // The planner keeps programs within the travel; paths may leave it by their tolerance.
+                travel: None,
                 status_ticks: settings.status_ticks(self.tick_s),
             },
         })

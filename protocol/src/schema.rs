@@ -24,7 +24,8 @@ Stream[Geometry,Spans,Controls]\
 HeaderField[Version,Table,Spans,GeometrySpans,StepExponent,QScale,Tick,Length,FractionBits,Limits]\
 TableError[Header HeaderField,Truncated{stream,index u32},Malformed{stream,index u32},\
 Range{stream,index u32},LeftOver{stream},Overfull{index u32},Count{stream},Bend{index u32},Slow{index u32},\
-Fast{index u32},ControlStep{index u32},Start,End]\
+Fast{index u32},ControlStep{index u32},Start,End,Limit{limit AxisLimit,index u32}]\
+AxisLimit[Velocity,Acceleration,Jerk,Travel]\
 block{length u16,message,crc32c u32}frame{first 1,last 1,number 6}";
 
 /// FNV-1a hash of [`SCHEMA`].

@@ -13,7 +13,7 @@ mod header;
 pub mod rules;
 pub mod span;
 
-pub use error::{HeaderField, Stream, TableError};
+pub use error::{AxisLimit, HeaderField, Stream, TableError};
 pub use header::{AxisHeader, FORMAT_VERSION, Limits, TableHeader};
 
 #[cfg(test)]

@@ -16,8 +16,14 @@ use tests::tables::{COARSE, Kind, Random, Sample, TICK_NS};
 const LIMITS: Limits = Limits { velocity: 1e9, acceleration: 1e12, jerk: None };
 
 fn config(axis: usize, position: i64) -> DriveConfig {
-    let axis_config =
-        AxisConfig { axis: axis as u8, tick_ns: TICK_NS, position, limits: LIMITS, status_ticks: 0 };
+    let axis_config = AxisConfig {
+        axis: axis as u8,
+        tick_ns: TICK_NS,
+        position,
+        limits: LIMITS,
+        travel: None,
+        status_ticks: 0,
+    };
     DriveConfig { node: node(axis), frames: FrameSize::Classic, axis: axis_config }
 }
 

@@ -13,6 +13,7 @@ use protocol::table::span::{Span, SpanReader};
 use protocol::table::{Stream, TableError};
 
 use crate::math::{a_series, g_series, s_series, sqrt};
+use crate::proof::{Rest, Speed};
 use crate::table::TableView;
 
 /// Share by which the f32 sum may exceed the rule that the planner keeps in f64.
@@ -39,6 +40,15 @@ enum Law {
     Quadratic { v0: f32, d: f32, gamma: f32 },
     /// x = h (t/T)^3, both from the end.
     Landing { h: f32, rate: f32 },
+}
+
+/// Motion on one span, for the proof of limits.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Stretch {
+    Launch(Rest),
+    Between(Speed),
+    /// Seen from the end.
+    Landing(Rest),
 }
 
 /// The span that plays, and what the next one needs to know.
@@ -163,6 +173,17 @@ impl LawCursor {
                 let dt = d * t;
                 let x = t * (v0 * s + dt * g);
                 PathState { x, speed: v0 * (1.0 + z * g) + dt * s, acceleration: d + gamma * x }
+            }
+        }
+    }
+
+    /// The span as the proof of limits sees it.
+    pub(crate) fn stretch(&self, view: &TableView<'_>) -> Stretch {
+        match self.law {
+            Law::Launch { h, rate } => Stretch::Launch(Rest { h, rate }),
+            Law::Landing { h, rate } => Stretch::Landing(Rest { h, rate }),
+            Law::Quadratic { v0, d, gamma } => {
+                Stretch::Between(Speed { h: length(view, self.here), q0: v0 * v0, d, gamma })
             }
         }
     }

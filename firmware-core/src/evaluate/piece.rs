@@ -8,6 +8,7 @@ use protocol::table::{Stream, TableError};
 use super::Setpoint;
 use super::law::PathState;
 use crate::math::nearest;
+use crate::proof::Slopes;
 use crate::table::TableView;
 
 /// position = base + c0 + c1 x + c2 x^2 + c3 x^3 [counts].
@@ -119,6 +120,28 @@ impl PieceCursor {
     /// The set-point at `path` from the end of the table, on the last geometry span.
     pub(crate) fn before_end(&self, path: PathState) -> Setpoint {
         self.backward.at(path)
+    }
+
+    /// Derivatives of position from `offset` on, over `h` [u].
+    pub(crate) fn slopes(&self, offset: f32, h: f32) -> Slopes {
+        Slopes::of(&self.forward.power, offset, h)
+    }
+
+    /// Derivatives of position from the end of the table back, over `h` [u].
+    pub(crate) fn slopes_before_end(&self, h: f32) -> Slopes {
+        Slopes::of(&self.backward.power, 0.0, h)
+    }
+
+    /// Two positions that the geometry span stays between [counts].
+    pub(crate) fn hull(&self, view: &TableView<'_>) -> [i64; 2] {
+        let h = self.lengths[2] as f32 * view.header.step();
+        let [c0, c1, c2, c3] = self.forward.power;
+        let third = c1 * h * (1.0 / 3.0);
+        let coefficients =
+            [c0, c0 + third, c0 + 2.0 * third + c2 * h * h * (1.0 / 3.0), c0 + h * (c1 + h * (c2 + h * c3))];
+        let low = coefficients.iter().fold(f32::INFINITY, |low, c| low.min(*c));
+        let high = coefficients.iter().fold(f32::NEG_INFINITY, |high, c| high.max(*c));
+        [low, high].map(|end| self.forward.base.saturating_add(i64::from(nearest(end))))
     }
 
     /// The first control point, before the first [`PieceCursor::advance`].

@@ -11,7 +11,7 @@ use std::vec::Vec;
 const LIMITS: Limits = Limits { velocity: 1e6, acceleration: 1e8, jerk: Some(1e10) };
 
 fn config() -> AxisConfig {
-    AxisConfig { axis: 0, tick_ns: 1_000_000, position: 100, limits: LIMITS, status_ticks: 0 }
+    AxisConfig { axis: 0, tick_ns: 1_000_000, position: 100, limits: LIMITS, travel: None, status_ticks: 0 }
 }
 
 /// A straight move of 8 u in one geometry span and five q spans, from 100 to 8100 counts.

@@ -92,6 +92,7 @@ fn parse(line: &[u8]) -> Line {
         [b't' | b'd' | b'b', a, b, c, length, ref digits @ ..] => {
             frame(&[a, b, c], length, digits).map_or(Line::Malformed, Line::Frame)
         }
+        [b't' | b'd' | b'b' | b'r' | b'T' | b'R', ..] => Line::Malformed,
         [letter, ..] => Line::Command(letter),
     }
 }

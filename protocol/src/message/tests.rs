@@ -1,7 +1,7 @@
 use super::*;
 use crate::bus::{BLOCK_BYTES, FrameSize, Reassembler, Segments};
 use crate::schema;
-use crate::table::{HeaderField, Limits, Stream};
+use crate::table::{AxisLimit, HeaderField, Limits, Stream};
 use proptest::prelude::*;
 
 extern crate std;
@@ -71,7 +71,7 @@ fn drive_messages_are_pinned() {
         limits: AXIS.limits,
         room: 4096,
     };
-    let cases: [(DriveMessage, &[u8]); 23] = [
+    let cases: [(DriveMessage, &[u8]); 24] = [
         (
             DriveMessage::Identity(identity),
             &[
@@ -84,6 +84,7 @@ fn drive_messages_are_pinned() {
         (reject(Reject::Table(truncated)), &[1, 1, 0, 1, 2, 0xc8, 1]),
         (reject(Reject::Table(TableError::Header(HeaderField::Limits))), &[1, 1, 0, 0, 9]),
         (reject(Reject::Table(TableError::End)), &[1, 1, 0, 12]),
+        (reject(Reject::Table(TableError::Limit { limit: AxisLimit::Jerk, index: 9 })), &[1, 1, 0, 13, 2, 9]),
         (reject(Reject::Checksum(Part::Axis)), &[1, 1, 1, 1]),
         (reject(Reject::Incomplete { part: Part::Shared, received: 7 }), &[1, 1, 2, 0, 7]),
         (reject(Reject::NoRoom { needed: 5, available: 4 }), &[1, 1, 3, 5, 4]),
@@ -110,7 +111,7 @@ fn drive_messages_are_pinned() {
 
 #[test]
 fn the_schema_is_pinned() {
-    assert_eq!(schema::HASH, 0xb267_26db_dd6d_28f3, "{:#018x}", schema::HASH);
+    assert_eq!(schema::HASH, 0xd018_bf3c_abac_fbef, "{:#018x}", schema::HASH);
 }
 
 #[test]
@@ -147,7 +148,7 @@ fn the_longest_headers_have_checksums() {
 #[test]
 fn bytes_behind_a_message_are_refused() {
     assert_eq!(decode::<HostMessage<'_>>(&[5, 0]), Err(MessageError::LeftOver));
-    assert_eq!(decode::<HostMessage<'_>>(&[6]), Err(MessageError::Malformed));
+    assert_eq!(decode::<HostMessage<'_>>(&[7]), Err(MessageError::Malformed));
     assert_eq!(decode::<HostMessage<'_>>(&[]), Err(MessageError::Malformed));
     assert_eq!(encode(&HostMessage::Open(HEADER), &mut [0; 4]), Err(MessageError::NoRoom));
 }

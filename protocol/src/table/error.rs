@@ -106,6 +106,26 @@ pub enum TableError {
     Start,
     /// The declared end is not the last control point.
     End,
+    /// That the axis keeps a limit on a q span cannot be proven.
+    Limit {
+        /// Which limit.
+        limit: AxisLimit,
+        /// Which q span.
+        index: u32,
+    },
+}
+
+/// A limit of an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum AxisLimit {
+    /// Largest |velocity|.
+    Velocity,
+    /// Largest |acceleration|.
+    Acceleration,
+    /// Largest |jerk|.
+    Jerk,
+    /// Range of positions.
+    Travel,
 }
 
 impl TableError {
@@ -145,6 +165,17 @@ impl fmt::Display for HeaderField {
     }
 }
 
+impl fmt::Display for AxisLimit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            AxisLimit::Velocity => "velocity",
+            AxisLimit::Acceleration => "acceleration",
+            AxisLimit::Jerk => "jerk",
+            AxisLimit::Travel => "travel",
+        })
+    }
+}
+
 impl fmt::Display for TableError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -169,6 +200,9 @@ impl fmt::Display for TableError {
             }
             TableError::Start => f.write_str("the declared start is not the first control point"),
             TableError::End => f.write_str("the declared end is not the last control point"),
+            TableError::Limit { limit, index } => {
+                write!(f, "the {limit} limit cannot be proven on q span {index}")
+            }
         }
     }
 }

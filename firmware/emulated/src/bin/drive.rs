@@ -38,6 +38,7 @@ const CONFIG: DriveConfig = {
             tick_ns: TICK_NS,
             position: 0,
             limits: Limits { velocity: 1e9, acceleration: 1e11, jerk: None },
+            travel: None,
             status_ticks: 100,
         },
     }

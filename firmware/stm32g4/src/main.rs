@@ -1,0 +1,188 @@
+//! A drive on an STM32G474, such as on a NUCLEO-G474RE with a CAN transceiver at PA11 and PA12.
+//!
+//! Frames come and go through FDCAN1 at 1 Mbit/s; the control tick is the core's own timer, whose interrupt runs above all
+//! communication. Nobody has run this on hardware yet: it is built and linked, and the core in it is the one that the emulated
+//! board runs. The power stage is up to whoever has one: see [`apply`].
+#![no_std]
+#![no_main]
+
+use core::cell::RefCell;
+
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m_rt::exception;
+use critical_section::Mutex;
+use embassy_executor::Spawner;
+use embassy_futures::select::{Either, select};
+use embassy_futures::yield_now;
+use embassy_stm32::can::config::TxBufferMode;
+use embassy_stm32::can::{CanConfigurator, IT0InterruptHandler, IT1InterruptHandler};
+use embassy_stm32::peripherals::FDCAN1;
+use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::{Config, bind_interrupts, can};
+use firmware_core::drive::{Drive, DriveConfig};
+use firmware_core::evaluate::Setpoint;
+use firmware_core::player::AxisConfig;
+use protocol::bus::{Frame, FrameSize, Node};
+use protocol::table::Limits;
+
+/// The core's clock: the 24 MHz of the board's crystal, divided by 6, times 85, divided by 2 [Hz].
+const CLOCK_HZ: u32 = 170_000_000;
+/// Nominal bit rate, and that of the data of CAN FD frames.
+const BIT_RATE: u32 = 1_000_000;
+#[cfg(feature = "fd")]
+const DATA_BIT_RATE: u32 = 2_000_000;
+/// Control tick [ns].
+const TICK_NS: u32 = 250_000;
+/// Room for one table; there are two [bytes].
+const ROOM: usize = 40 * 1024;
+/// Address on the bus; the axis is the one before it.
+const NODE: u8 = match option_env!("FEEDSPLINE_NODE") {
+    Some(digits) => match u8::from_str_radix(digits, 10) {
+        Ok(number) => number,
+        Err(_) => 0,
+    },
+    None => 1,
+};
+
+const CONFIG: DriveConfig = {
+    let Some(node) = Node::new(NODE) else { panic!("FEEDSPLINE_NODE is a number from 1 to 127") };
+    DriveConfig {
+        node,
+        frames: if cfg!(feature = "fd") { FrameSize::Fd } else { FrameSize::Classic },
+        axis: AxisConfig {
+            axis: NODE - 1,
+            tick_ns: TICK_NS,
+            position: 0,
+            // Those of the motor and the slide: set them before anything moves.
+            limits: Limits { velocity: 1e6, acceleration: 1e8, jerk: Some(1e10) },
+            travel: None,
+            status_ticks: 400,
+        },
+    }
+};
+
+/// The drive, shared by the control interrupt and the bus.
+static DRIVE: Mutex<RefCell<Option<Drive<'static>>>> = Mutex::new(RefCell::new(None));
+
+bind_interrupts!(struct Irqs {
+    FDCAN1_IT0 => IT0InterruptHandler<FDCAN1>;
+    FDCAN1_IT1 => IT1InterruptHandler<FDCAN1>;
+});
+
+#[embassy_executor::main]
+async fn main(_spawner: Spawner) {
+    static mut A: [u8; ROOM] = [0; ROOM];
+    static mut B: [u8; ROOM] = [0; ROOM];
+    // SAFETY: this runs once, and nobody else names the two.
+    let (a, b) = unsafe { (&mut *(&raw mut A), &mut *(&raw mut B)) };
+    let peripherals = embassy_stm32::init(clocks());
+    let drive = Drive::new(CONFIG, a, b);
+    critical_section::with(|cs| {
+        if let Ok(mut place) = DRIVE.borrow(cs).try_borrow_mut() {
+            *place = Some(drive);
+        }
+    });
+    if let Some(core) = cortex_m::Peripherals::take() {
+        let mut timer = core.SYST;
+        timer.set_clock_source(SystClkSource::Core);
+        timer.set_reload(CLOCK_HZ / 1_000_000 * (TICK_NS / 1_000) - 1);
+        timer.clear_current();
+        timer.enable_counter();
+        timer.enable_interrupt();
+    }
+    let mut bus = CanConfigurator::new(peripherals.FDCAN1, peripherals.PA11, peripherals.PA12, Irqs);
+    bus.set_bitrate(BIT_RATE);
+    #[cfg(feature = "fd")]
+    bus.set_fd_data_bitrate(DATA_BIT_RATE, true);
+    // Frames of one block keep their order.
+    bus.set_config(bus.config().set_tx_buffer_mode(TxBufferMode::Fifo));
+    let (mut out, mut into, _) = bus.into_normal_mode().split();
+    loop {
+        if let Either::First(Some(frame)) = select(receive(&mut into), yield_now()).await {
+            with_drive(|drive| drive.receive(&frame));
+        }
+        if let Some(frame) = with_drive(Drive::poll_transmit).flatten() {
+            send(&mut out, &frame).await;
+        }
+    }
+}
+
+/// The next data frame with a short identifier. The bus' errors are the controller's to count and to recover from.
+#[cfg(not(feature = "fd"))]
+async fn receive(bus: &mut can::CanRx<'static>) -> Option<Frame> {
+    let (frame, _) = bus.read().await.ok()?.parts();
+    short(frame.id()).and_then(|id| Frame::new(id, frame.data()))
+}
+
+#[cfg(feature = "fd")]
+async fn receive(bus: &mut can::CanRx<'static>) -> Option<Frame> {
+    let (frame, _) = bus.read_fd().await.ok()?.parts();
+    short(frame.id()).and_then(|id| Frame::new(id, frame.data()))
+}
+
+#[cfg(not(feature = "fd"))]
+async fn send(bus: &mut can::CanTx<'static>, frame: &Frame) {
+    if let Ok(frame) = can::frame::Frame::new_standard(frame.id(), frame.data()) {
+        bus.write(&frame).await;
+    }
+}
+
+#[cfg(feature = "fd")]
+async fn send(bus: &mut can::CanTx<'static>, frame: &Frame) {
+    if let Ok(frame) = can::frame::FdFrame::new_standard(frame.id(), frame.data()) {
+        bus.write_fd(&frame).await;
+    }
+}
+
+fn short(id: &embedded_can::Id) -> Option<u16> {
+    match id {
+        embedded_can::Id::Standard(id) => Some(id.as_raw()),
+        embedded_can::Id::Extended(_) => None,
+    }
+}
+
+/// 170 MHz from the board's 24 MHz crystal, which also feeds the bus: the chip's own oscillator is too coarse for it.
+fn clocks() -> Config {
+    let mut config = Config::default();
+    config.rcc.hse = Some(Hse { freq: Hertz(24_000_000), mode: HseMode::Oscillator });
+    config.rcc.pll = Some(Pll {
+        source: PllSource::HSE,
+        prediv: PllPreDiv::DIV6,
+        mul: PllMul::MUL85,
+        divp: None,
+        divq: None,
+        divr: Some(PllRDiv::DIV2),
+    });
+    config.rcc.sys = Sysclk::PLL1_R;
+    config.rcc.boost = true;
+    config.rcc.mux.fdcansel = embassy_stm32::rcc::mux::Fdcansel::HSE;
+    config
+}
+
+/// The control tick.
+#[exception]
+fn SysTick() {
+    if let Some(setpoint) = with_drive(Drive::tick) {
+        apply(setpoint);
+    }
+}
+
+/// Hands a set-point to the servo: whoever has a power stage closes the position loop here.
+fn apply(setpoint: Setpoint) {
+    let _ = setpoint;
+}
+
+/// Does something to the drive while nobody else can.
+fn with_drive<R>(act: impl FnOnce(&mut Drive<'static>) -> R) -> Option<R> {
+    critical_section::with(|cs| DRIVE.borrow(cs).try_borrow_mut().ok()?.as_mut().map(act))
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    // The watchdog of a machine's own supply is what ends this; motion has stopped with the control tick.
+    cortex_m::interrupt::disable();
+    loop {
+        cortex_m::asm::nop();
+    }
+}
