@@ -82,10 +82,9 @@ impl Granted {
 
     /// Proves a span between rests; the limit that cannot be proven otherwise.
     pub(crate) fn span(&self, p: &Slopes, s: &Speed) -> Result<(), AxisLimit> {
-        let q1 = s.q0 + s.h * (2.0 * s.d + s.h * s.gamma);
-        let d1 = s.d + s.h * s.gamma;
-        let fastest = s.q0.max(q1).max(s.q0 + s.h * s.d);
-        let bend = s.d.abs().max(d1.abs());
+        // Bounds on q and |q'|/2 that need no case.
+        let bend = s.d.abs() + s.h * s.gamma.abs();
+        let fastest = s.q0 + 2.0 * s.h * bend;
         let [m1, m2, m3] = p.sizes;
         let error = [
             ROUNDING * m1 * m1 * fastest,
@@ -113,12 +112,13 @@ impl Granted {
         let (q0, d0) = (s.q0 + from * (2.0 * s.d + from * s.gamma), s.d + from * s.gamma);
         let q = [q0, q0 + width * d0, q0 + width * (2.0 * d0 + width * s.gamma)];
         let d = [d0, d0 + width * s.gamma];
-        let most = |values: &[f32]| values.iter().fold(0.0f32, |most, v| larger(most, v.abs()));
-        let least = q[0].min(q[1]).min(q[2]);
-        // Also what is not a number fails.
+        // What is not a number is within nothing.
+        let within = |values: &[f32], limit: f32| values.iter().all(|v| v.abs() <= limit);
         let velocity = self.velocity * self.velocity - error[0];
-        let (slope, fastest) = (most(&b), most(&q));
-        if !(slope * slope * fastest <= velocity) && !(most(&velocities(&b, &q)) <= velocity) {
+        let slope = p1.abs() + width * (p2.abs() + 0.5 * width * p.p3.abs());
+        let fastest = q0 + width * (2.0 * d0.abs() + width * s.gamma.abs());
+        let slow = slope * slope * fastest <= velocity || within(&velocities(&b, &q), velocity);
+        if !slow {
             return Err(AxisLimit::Velocity);
         }
         let acceleration = [
@@ -127,10 +127,11 @@ impl Granted {
             (2.0 * (c[1] * q[1] + b[1] * d[1]) + c[0] * q[2] + b[2] * d[0]) * (1.0 / 3.0),
             c[1] * q[2] + b[2] * d[1],
         ];
-        if !(most(&acceleration) <= self.acceleration - error[1]) {
+        if !within(&acceleration, self.acceleration - error[1]) {
             return Err(AxisLimit::Acceleration);
         }
-        if self.jerk == f32::INFINITY {
+        let jerk = self.jerk;
+        if jerk == f32::INFINITY {
             return Ok(());
         }
         let f = [
@@ -138,11 +139,13 @@ impl Granted {
             p.p3 * q[1] + 1.5 * (c[0] * d[1] + c[1] * d[0]) + s.gamma * b[1],
             p.p3 * q[2] + 3.0 * c[1] * d[1] + s.gamma * b[2],
         ];
-        let (size, jerk) = (most(&f) + error[2], self.jerk);
-        if size * size * fastest <= jerk * jerk * (1.0 - ROUNDING) {
+        let allowed = jerk * jerk * (1.0 - ROUNDING);
+        if f.iter().all(|f| (f.abs() + error[2]) * (f.abs() + error[2]) * fastest <= allowed) {
             return Ok(());
         }
-        if !(least > 0.0) {
+        let least = q[0].min(q[1]).min(q[2]);
+        let moves = least > 0.0;
+        if !moves {
             return Err(AxisLimit::Jerk);
         }
         let holds = |s: f32| {
@@ -186,7 +189,8 @@ impl Granted {
                 terms.iter().map(|(k, factor)| factor * power(*k)).sum::<f32>().abs()
             };
             let most = (0..=REST_PARTS).map(at).fold(0.0, larger) + between + weight * size;
-            if !(most * scale <= limit) {
+            let kept = most * scale <= limit;
+            if !kept {
                 return Err(name);
             }
         }

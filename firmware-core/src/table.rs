@@ -104,10 +104,10 @@ impl<'a> TableView<'a> {
         let mut law = LawCursor::start(&self)?;
         let (mut duration, mut offset) = (0u64, 0u32);
         loop {
-            judge(&law, &piece, offset as f32 * self.header.step())?;
             if law.duration() < shortest {
                 return Err(TableError::Fast { index: law.index() });
             }
+            judge(&law, &piece, offset as f32 * self.header.step())?;
             duration = duration.saturating_add(law.duration());
             if law.is_last() {
                 break;

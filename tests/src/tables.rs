@@ -98,7 +98,8 @@ impl Sample {
         let axes = random.whole(1, 4);
         let mut scales = Vec::new();
         let axes = (0..axes).map(|_| {
-            let limits = AxisLimits { velocity: 1e3, acceleration: 1e5, jerk: 1e7 };
+            // Whatever the motion, it keeps these.
+            let limits = AxisLimits { velocity: 9e5, acceleration: 9e8, jerk: f64::INFINITY };
             scales.push(AxisScale { counts_per_unit: kind.counts_per_unit, limits });
             let lsb = (-(random.whole(0, 4) as f64)).exp2() / kind.counts_per_unit;
             axis(random, &breaks, step, lsb)

@@ -1,5 +1,7 @@
 //! The drive's own proof of its limits, on tables that are meant to pass and on tables that are not.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
 use std::collections::BTreeMap;
 
 use firmware_core::evaluate::Cursor;

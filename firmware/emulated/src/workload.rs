@@ -45,7 +45,7 @@ pub struct Played {
     pub hash: u64,
 }
 
-/// Checks and plays every table; `around` is put round each check and each set-point, with the number of spans or `None`.
+/// Proves and plays every table; `around` is put round each proof and each set-point, with the number of spans or `None`.
 ///
 /// `None`: a table is refused.
 pub fn play(bytes: &[u8], mut around: impl FnMut(Option<u32>, &mut dyn FnMut())) -> Option<Played> {
@@ -55,7 +55,7 @@ pub fn play(bytes: &[u8], mut around: impl FnMut(Option<u32>, &mut dyn FnMut()))
         let axis: AxisHeader = protocol::message::decode(axis).ok()?;
         let view = TableView::new(header, axis, shared, controls).ok()?;
         let mut checked = None;
-        around(Some(header.spans), &mut || checked = view.check().ok());
+        around(Some(header.spans), &mut || checked = view.prove(None).ok());
         let table = checked?;
         let mut cursor = Cursor::new(&table).ok()?;
         let mut clock = PathClock::new(header.tick_ns);

@@ -7,7 +7,7 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 use crate::shell::Step;
 
 /// Most bytes of flash that the drive's image may take: what was measured, and a twentieth more.
-const MOST_FLASH: u64 = 44_000;
+const MOST_FLASH: u64 = 49_000;
 /// Most bytes of RAM beside the two table buffers and the stack.
 const MOST_RAM: u64 = 2_200;
 /// The two table buffers of the drive's image.

@@ -62,11 +62,11 @@ fn main() -> ! {
     }
     let empty = counted(&mut || {});
     let net = |counts: u32| counts.saturating_sub(empty);
-    let (mut tick, mut check, mut plan) = (Cost::default(), Cost::default(), Cost::default());
+    let (mut tick, mut prove, mut plan) = (Cost::default(), Cost::default(), Cost::default());
     let played = play(TABLES, |spans, work| {
         let counts = net(counted(work));
         match spans {
-            Some(spans) => check.note(counts / spans.max(1)),
+            Some(spans) => prove.note(counts / spans.max(1)),
             None => tick.note(counts),
         }
     });
@@ -81,7 +81,7 @@ fn main() -> ! {
     hprintln!("plans {}", planned.plans);
     hprintln!("imprecise {}", planned.imprecise);
     hprintln!("plan_hash {}", planned.hash);
-    for (name, cost) in [("tick", &tick), ("check_per_span", &check), ("plan", &plan)] {
+    for (name, cost) in [("tick", &tick), ("prove_per_span", &prove), ("plan", &plan)] {
         hprintln!("{}_most {}", name, cost.most());
         hprintln!("{}_mean {}", name, cost.mean());
     }
