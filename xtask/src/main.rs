@@ -60,6 +60,15 @@ enum Word {
         #[arg(long, default_value_t = 0)]
         from: u64,
     },
+    /// Plan random motions from state to state beside another planner, and integrate every one of them
+    DoubleS {
+        /// How many of each kind
+        #[arg(long, default_value_t = 1_000_000)]
+        count: u64,
+        /// Which
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
     /// Run the release binary over a folder of part programs and print a table
     Real {
         /// The folder; sub-folders are searched, .gz files are unpacked with gzip
@@ -87,6 +96,7 @@ fn main() -> ExitCode {
         Word::Firmware => firmware::run(&root),
         Word::Names => names::check(&root),
         Word::RandomPaths { count, seed, from } => random_paths(&root, count, seed, from),
+        Word::DoubleS { count, seed } => double_s(&root, count, seed),
         Word::Real { dir, machine } => real::table(&root, &dir, machine.as_deref()),
     };
     match result {
@@ -131,6 +141,23 @@ fn random_paths(root: &Path, count: u64, seed: u64, from: u64) -> Step {
         ],
         &[("FEEDSPLINE_CASES", &count), ("FEEDSPLINE_SEED", &seed), ("FEEDSPLINE_FROM", &from)],
     )
+}
+
+/// The core's own random tests in larger numbers, then the comparison with a peer.
+fn double_s(root: &Path, count: u64, seed: u64) -> Step {
+    /// Cases of each kind in the core's tests, about.
+    const TESTED: u64 = 40_000;
+    let times = count.div_ceil(TESTED).to_string();
+    let [count, seed] = [count, seed].map(|n| n.to_string());
+    shell::cargo_with(
+        root,
+        &["test", "--release", "--locked", "--package", "firmware-core", "double_s"],
+        &[("FEEDSPLINE_CASES", &times), ("FEEDSPLINE_SEED", &seed)],
+    )?;
+    let manifest = ["--manifest-path", "tests/peers/Cargo.toml", "--target-dir", "target"];
+    let words =
+        [&["run", "--release", "--locked", "--bin", "double_s"][..], &manifest, &["--", &count, &seed]];
+    cargo(root, &words.concat())
 }
 
 fn doc(root: &Path) -> Step {
