@@ -8,8 +8,12 @@ use std::path::Path;
 use cli::args::{CompareArgs, PlanArgs, RunArgs};
 use cli::engine::{Compared, Engine, Outcome};
 use cli::failure::Failure;
-use cli::json::{AxisRatiosJson, CertificateJson, InspectAxisJson, InspectJson, VerifyJson};
+use cli::json::{AxisRatiosJson, CertificateJson, FlashJson, InspectAxisJson, InspectJson, VerifyJson};
 use cli::progress::Progress;
+use protocol::bus::Node;
+use protocol::message::Identity;
+use protocol::schema;
+use protocol::table::Limits;
 use serde_json::Value;
 
 use crate::sample;
@@ -312,6 +316,26 @@ fn fields(value: &Value, found: &mut BTreeSet<String>) {
     }
 }
 
+/// What a drive says of itself, as `flash` tells it.
+fn flashed(schema: u64) -> FlashJson {
+    let limits = Limits { velocity: 1e6, acceleration: 1e8, jerk: None };
+    let identity =
+        Identity { version: [1, 2, 3], format: 1, schema, axis: 4, tick_ns: 250_000, limits, room: 4096 };
+    FlashJson::of("emulated", Path::new("drive"), Node::new(5).unwrap(), &identity, schema == schema::HASH)
+}
+
+#[test]
+fn flash_tells_whether_the_drive_speaks_this_protocol() {
+    let text = cli::summary::flash(&flashed(schema::HASH));
+    assert!(text.contains("1.2.3") && text.contains("the host's") && !text.contains("NOT"), "{text}");
+    assert!(cli::summary::flash(&flashed(7)).contains("0000000000000007, NOT the host's"));
+    let said = say(&GOOD, &["flash", "--board", "emulated", "--image", "/does/not/exist"]);
+    assert_eq!((said.status, said.out.as_str()), (2, ""));
+    assert!(said.err.contains("/does/not/exist"), "{}", said.err);
+    assert_eq!(say(&GOOD, &["flash", "--board", "emulated", "--node", "0"]).status, 2);
+    assert_eq!(say(&GOOD, &["flash", "--board", "toaster"]).status, 2);
+}
+
 #[test]
 fn the_documentation_explains_every_field_and_no_other() {
     let text = include_str!("../../../docs/json.md");
@@ -330,6 +354,7 @@ fn the_documentation_explains_every_field_and_no_other() {
     fields(&json(&say(&GOOD, &["move", file.to_str().unwrap(), "--json"])), &mut found);
     let one = ["--p0", "0", "--p1", "1", "--vmax", "1", "--amax", "1", "--jmax", "1"];
     fields(&json(&say(&GOOD, &[&["move", "--json"][..], &one].concat())), &mut found);
+    fields(&serde_json::to_value(flashed(schema::HASH)).unwrap(), &mut found);
     for name in &found {
         assert!(text.contains(&format!("`{name}`")), "docs/json.md does not explain {name}");
     }
