@@ -11,6 +11,7 @@
 pub mod double_s;
 pub mod drive;
 pub mod evaluate;
+mod landing;
 mod math;
 pub mod player;
 pub mod proof;

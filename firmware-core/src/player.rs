@@ -3,14 +3,16 @@
 //! Two buffers: while one table plays, the next one comes into the other. A table is played only if it came
 //! completely, its checksums hold, it obeys the format's rules, is meant for this axis, tick and limits, and
 //! begins where the motion before it ends. Every table ends at rest, so whatever fails to arrive, the axis comes
-//! to rest on its path.
+//! to rest on its path. A quick stop, a table that is not what was checked, or a set-point beyond the axis' limits leaves the
+//! path: the axis comes to rest by a double-S from the set-point before, within its limits, and faults stay latched.
 
 use heapless::Deque;
 use protocol::message::{DriveMessage, Fault, HostMessage, Identity, Reject, State, Status};
 use protocol::schema;
-use protocol::table::{FORMAT_VERSION, Limits, TableHeader};
+use protocol::table::{AxisLimit, FORMAT_VERSION, Limits, TableHeader};
 
 use crate::evaluate::{Cursor, Setpoint};
+use crate::landing::Landing;
 use crate::store::Slot;
 use crate::time::{PathClock, ticks_until};
 
@@ -31,6 +33,11 @@ const fn number(digits: &str) -> u8 {
         Err(_) => u8::MAX,
     }
 }
+
+/// Share by which a set-point may exceed a limit before the drive faults: more than a proven table ever does.
+const TRIP: f32 = 0.02;
+/// What rounding adds to the way of one tick [counts].
+const STEP_COUNTS: f32 = 2.0;
 
 /// What a drive knows of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,7 +91,10 @@ pub struct Player<'a> {
     /// Number of the next tick.
     tick: u64,
     status_in: u32,
-    position: i64,
+    /// The set-point that was given last.
+    last: Setpoint,
+    /// The way to rest off the path.
+    landing: Option<Landing>,
     playing: Option<Playing>,
     armed: Option<Armed>,
     has_played: bool,
@@ -101,7 +111,8 @@ impl<'a> Player<'a> {
             b: Slot::new(b),
             tick: 0,
             status_in: config.status_ticks,
-            position: config.position,
+            last: Setpoint::at_rest(config.position),
+            landing: None,
             playing: None,
             armed: None,
             has_played: false,
@@ -130,6 +141,10 @@ impl<'a> Player<'a> {
                 self.clear_unused();
                 return;
             }
+            HostMessage::QuickStop => {
+                self.land();
+                return;
+            }
             HostMessage::Identify => {
                 let identity = self.identity();
                 self.answer(DriveMessage::Identity(identity));
@@ -143,16 +158,18 @@ impl<'a> Player<'a> {
 
     /// The set-point of this tick; call it once per control tick.
     pub fn tick(&mut self) -> Setpoint {
-        self.begin();
-        let setpoint = match self.play() {
-            Ok(setpoint) => setpoint,
-            Err(fault) => {
-                self.fault = Some(fault);
-                (self.playing, self.armed) = (None, None);
-                Setpoint::at_rest(self.position)
-            }
+        let planned = if self.landing.is_some() {
+            Ok(self.descend())
+        } else {
+            self.begin();
+            self.play().and_then(|setpoint| self.allowed(setpoint))
         };
-        self.position = setpoint.position;
+        let setpoint = planned.unwrap_or_else(|fault| {
+            self.fault = self.fault.or(Some(fault));
+            self.land();
+            self.descend()
+        });
+        self.last = setpoint;
         self.tick = self.tick.saturating_add(1);
         if self.config.status_ticks > 0 {
             self.status_in = self.status_in.saturating_sub(1);
@@ -179,12 +196,13 @@ impl<'a> Player<'a> {
             let table = self.slot(armed.side).checked()?;
             Some(armed.tick.saturating_add(ticks_until(table.duration(), self.config.tick_ns)))
         });
-        let end = armed_end.or(self.playing.map(|p| p.end)).unwrap_or(self.tick);
+        let landed = self.landing.as_ref().map(|landing| self.tick.saturating_add(landing.left()));
+        let end = landed.or(armed_end).or(self.playing.map(|p| p.end)).unwrap_or(self.tick);
         Status {
             state: self.state(),
             fault: self.fault,
             tick: self.tick,
-            position: self.position,
+            position: self.last.position,
             fill: after(end),
         }
     }
@@ -202,6 +220,8 @@ impl<'a> Player<'a> {
         let (a, b) = (self.a.number(), self.b.number());
         if self.fault.is_some() {
             State::Fault
+        } else if self.landing.is_some() {
+            State::Stopping
         } else if self.playing.is_some() {
             State::Running
         } else if self.armed.is_some() {
@@ -214,6 +234,46 @@ impl<'a> Player<'a> {
             State::Holding
         } else {
             State::Idle
+        }
+    }
+
+    /// Leaves the path for the shortest way to rest; tables are forgotten. At rest there is nothing to do.
+    fn land(&mut self) {
+        if self.landing.is_none() && !self.last.done {
+            let AxisConfig { limits, tick_ns, .. } = self.config;
+            // Without one, as when the set-point is no number, standing still at once is all that is left.
+            self.landing = Landing::new(&self.last, &limits, tick_ns).ok();
+        }
+        (self.playing, self.armed) = (None, None);
+        self.clear_unused();
+    }
+
+    /// The next set-point on the way to rest.
+    fn descend(&mut self) -> Setpoint {
+        let Some(landing) = &mut self.landing else { return Setpoint::at_rest(self.last.position) };
+        let setpoint = landing.next();
+        if setpoint.done {
+            self.landing = None;
+            self.has_played = true;
+        }
+        setpoint
+    }
+
+    /// The last line: a set-point that keeps the axis' limits, whatever led to it.
+    fn allowed(&self, setpoint: Setpoint) -> Result<Setpoint, Fault> {
+        let Limits { velocity, acceleration, .. } = self.config.limits;
+        let tick_s = self.config.tick_ns as f32 * 1e-9;
+        let moved = setpoint.position.saturating_sub(self.last.position).unsigned_abs() as f32;
+        let slow = setpoint.velocity.abs() <= velocity * (1.0 + TRIP)
+            && moved <= velocity * tick_s * (1.0 + TRIP) + STEP_COUNTS;
+        let even = setpoint.acceleration.abs() <= acceleration * (1.0 + TRIP);
+        let within = setpoint.position == self.last.position
+            || self.config.travel.is_none_or(|[low, high]| (low..=high).contains(&setpoint.position));
+        match (slow, even, within) {
+            (true, true, true) => Ok(setpoint),
+            (false, _, _) => Err(Fault::Limit(AxisLimit::Velocity)),
+            (_, false, _) => Err(Fault::Limit(AxisLimit::Acceleration)),
+            (_, _, false) => Err(Fault::Limit(AxisLimit::Travel)),
         }
     }
 
@@ -238,9 +298,9 @@ impl<'a> Player<'a> {
     }
 
     fn play(&mut self) -> Result<Setpoint, Fault> {
-        let Some(mut playing) = self.playing else { return Ok(Setpoint::at_rest(self.position)) };
+        let Some(mut playing) = self.playing else { return Ok(Setpoint::at_rest(self.last.position)) };
         let slot = self.slot(playing.side);
-        let Some(table) = slot.checked() else { return Ok(Setpoint::at_rest(self.position)) };
+        let Some(table) = slot.checked() else { return Ok(Setpoint::at_rest(self.last.position)) };
         let setpoint = playing
             .cursor
             .evaluate(&table, playing.clock.time())
@@ -317,6 +377,9 @@ impl<'a> Player<'a> {
     fn start(&mut self, number: u32, tick: u64) -> Result<(), Reject> {
         self.refuse_in_fault()?;
         let side = self.side_of(number).ok_or(Reject::NotReady)?;
+        if self.landing.is_some() {
+            return Err(Reject::Busy);
+        }
         if self.playing.is_some_and(|p| p.side == side) {
             return Ok(());
         }
@@ -344,7 +407,8 @@ impl<'a> Player<'a> {
     /// Where the axis will stand when all that it must still play has been played [counts].
     fn next_position(&self) -> i64 {
         let armed = self.armed.and_then(|armed| Some(self.slot(armed.side).checked()?.axis().end));
-        armed.or(self.playing.map(|p| p.position)).unwrap_or(self.position)
+        let landed = self.landing.as_ref().map(Landing::end);
+        landed.or(armed).or(self.playing.map(|p| p.position)).unwrap_or(self.last.position)
     }
 
     fn refuse_in_fault(&self) -> Result<(), Reject> {

@@ -5,7 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::bus::MESSAGE_BYTES;
-use crate::table::{AxisHeader, Limits, TableError, TableHeader};
+use crate::table::{AxisHeader, AxisLimit, Limits, TableError, TableHeader};
 
 /// Most table bytes of one [`HostMessage::Data`]; with all its other fields it then fits a block.
 pub const DATA_BYTES: usize = 312;
@@ -51,6 +51,8 @@ pub enum HostMessage<'a> {
     Stop,
     /// Who is there? Every drive that hears it answers [`DriveMessage::Identity`], whatever its state.
     Identify,
+    /// Comes to rest as fast as the axis' own limits allow, off the path if need be, and forgets all tables.
+    QuickStop,
 }
 
 /// A part of a table.
@@ -136,8 +138,10 @@ pub enum State {
     Running,
     /// Stands still at the end of a table.
     Holding,
-    /// Stands still after a fault, until it is built anew.
+    /// A fault is latched, until the drive is built anew; it stands still, or comes to rest.
     Fault,
+    /// Comes to rest off the path.
+    Stopping,
 }
 
 /// Why a drive gave up.
@@ -150,6 +154,8 @@ pub enum Fault {
         /// What was wrong.
         error: TableError,
     },
+    /// A set-point would have broken a limit of the axis.
+    Limit(AxisLimit),
 }
 
 /// Why a drive refuses a message.

@@ -38,7 +38,7 @@ const AXIS: AxisHeader = AxisHeader {
 fn host_messages_are_pinned() {
     let data = HostMessage::Data { table: 300, part: Part::Axis, offset: 5, bytes: &[7, 8] };
     let seal = HostMessage::Seal { table: 1, part: Part::Shared, crc: 0x80 };
-    let cases: [(HostMessage<'_>, &[u8]); 7] = [
+    let cases: [(HostMessage<'_>, &[u8]); 8] = [
         (HostMessage::Open(HEADER), &[0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10]),
         (
             HostMessage::OpenAxis(AXIS),
@@ -49,6 +49,7 @@ fn host_messages_are_pinned() {
         (HostMessage::Start { table: 1, tick: 1000 }, &[4, 1, 0xe8, 7]),
         (HostMessage::Stop, &[5]),
         (HostMessage::Identify, &[6]),
+        (HostMessage::QuickStop, &[7]),
     ];
     for (message, golden) in cases {
         assert_eq!(bytes(&message), golden, "{message:?}");
@@ -111,7 +112,7 @@ fn drive_messages_are_pinned() {
 
 #[test]
 fn the_schema_is_pinned() {
-    assert_eq!(schema::HASH, 0xd018_bf3c_abac_fbef, "{:#018x}", schema::HASH);
+    assert_eq!(schema::HASH, 0x5ec1_d1c8_d668_aa7d, "{:#018x}", schema::HASH);
 }
 
 #[test]
@@ -148,7 +149,7 @@ fn the_longest_headers_have_checksums() {
 #[test]
 fn bytes_behind_a_message_are_refused() {
     assert_eq!(decode::<HostMessage<'_>>(&[5, 0]), Err(MessageError::LeftOver));
-    assert_eq!(decode::<HostMessage<'_>>(&[7]), Err(MessageError::Malformed));
+    assert_eq!(decode::<HostMessage<'_>>(&[8]), Err(MessageError::Malformed));
     assert_eq!(decode::<HostMessage<'_>>(&[]), Err(MessageError::Malformed));
     assert_eq!(encode(&HostMessage::Open(HEADER), &mut [0; 4]), Err(MessageError::NoRoom));
 }
