@@ -55,6 +55,7 @@ impl<'a> Drive<'a> {
     }
 
     /// Takes a frame from the bus; frames of others are ignored.
+    #[inline(never)]
     pub fn receive(&mut self, frame: &Frame) {
         let message = if frame.id() == ids::STOP {
             self.stop.push(frame.data())
@@ -78,6 +79,7 @@ impl<'a> Drive<'a> {
     }
 
     /// The next frame to send.
+    #[inline(never)]
     pub fn poll_transmit(&mut self) -> Option<Frame> {
         loop {
             let message = self.answer.get(..self.answer_length).unwrap_or(&[]);

@@ -27,9 +27,8 @@ impl Landing {
     /// The set-point is no number, or the limits are none.
     pub(crate) fn new(from: &Setpoint, limits: &Limits, tick_ns: u32) -> Result<Self, DoubleSError> {
         let tick_s = tick_ns as f32 * 1e-9;
-        let jerk = limits.jerk.unwrap_or(limits.acceleration / (SOFT_TICKS * tick_s));
         let state = State { position: 0.0, velocity: from.velocity, acceleration: from.acceleration };
-        let limits = MotionLimits::symmetric(limits.velocity, limits.acceleration, jerk);
+        let limits = softened(limits, tick_ns);
         let profile = plan_velocity(&state, 0.0, &limits)?;
         Ok(Self { base: from.position, profile, tick_s, ticks: 0 })
     }
@@ -59,6 +58,12 @@ impl Landing {
     fn at(&self, position: f32) -> i64 {
         self.base.saturating_add(i64::from(nearest(position)))
     }
+}
+
+/// An axis' limits as limits of a motion.
+pub(crate) fn softened(limits: &Limits, tick_ns: u32) -> MotionLimits<f32> {
+    let jerk = limits.jerk.unwrap_or(limits.acceleration / (SOFT_TICKS * tick_ns as f32 * 1e-9));
+    MotionLimits::symmetric(limits.velocity, limits.acceleration, jerk)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@
 //! [`drive`] puts it behind CAN frames.
 #![no_std]
 
+mod approach;
 pub mod double_s;
 pub mod drive;
 pub mod evaluate;

@@ -4,13 +4,15 @@
 //! completely, its checksums hold, it obeys the format's rules, is meant for this axis, tick and limits, and
 //! begins where the motion before it ends. Every table ends at rest, so whatever fails to arrive, the axis comes
 //! to rest on its path. A quick stop, a table that is not what was checked, or a set-point beyond the axis' limits leaves the
-//! path: the axis comes to rest by a double-S from the set-point before, within its limits, and faults stay latched.
+//! path: the axis comes to rest by a double-S from the set-point before, within its limits, and faults stay latched. At rest it
+//! may be sent to a position.
 
 use heapless::Deque;
 use protocol::message::{DriveMessage, Fault, HostMessage, Identity, Reject, State, Status};
 use protocol::schema;
 use protocol::table::{AxisLimit, FORMAT_VERSION, Limits, TableHeader};
 
+use crate::approach::Approach;
 use crate::evaluate::{Cursor, Setpoint};
 use crate::landing::Landing;
 use crate::store::Slot;
@@ -82,6 +84,38 @@ struct Armed {
     tick: u64,
 }
 
+/// Motion without a table.
+#[derive(Clone, Debug)]
+enum Excursion {
+    /// To rest.
+    Landing(Landing),
+    /// To a position.
+    Approach(Approach),
+}
+
+impl Excursion {
+    fn next(&mut self) -> Setpoint {
+        match self {
+            Excursion::Landing(way) => way.next(),
+            Excursion::Approach(way) => way.next(),
+        }
+    }
+
+    fn end(&self) -> i64 {
+        match self {
+            Excursion::Landing(way) => way.end(),
+            Excursion::Approach(way) => way.end(),
+        }
+    }
+
+    fn left(&self) -> u64 {
+        match self {
+            Excursion::Landing(way) => way.left(),
+            Excursion::Approach(way) => way.left(),
+        }
+    }
+}
+
 /// One axis.
 #[derive(Debug)]
 pub struct Player<'a> {
@@ -93,8 +127,8 @@ pub struct Player<'a> {
     status_in: u32,
     /// The set-point that was given last.
     last: Setpoint,
-    /// The way to rest off the path.
-    landing: Option<Landing>,
+    /// Motion without a table.
+    excursion: Option<Excursion>,
     playing: Option<Playing>,
     armed: Option<Armed>,
     has_played: bool,
@@ -112,7 +146,7 @@ impl<'a> Player<'a> {
             tick: 0,
             status_in: config.status_ticks,
             last: Setpoint::at_rest(config.position),
-            landing: None,
+            excursion: None,
             playing: None,
             armed: None,
             has_played: false,
@@ -122,6 +156,7 @@ impl<'a> Player<'a> {
     }
 
     /// Takes a message; answers wait in [`Player::poll_answer`].
+    #[inline(never)]
     pub fn handle(&mut self, message: &HostMessage<'_>) {
         let (table, result) = match *message {
             HostMessage::Open(header) => (header.table, self.open(header)),
@@ -141,6 +176,7 @@ impl<'a> Player<'a> {
                 self.clear_unused();
                 return;
             }
+            HostMessage::MoveTo { position, velocity } => (0, self.approach(position, velocity)),
             HostMessage::QuickStop => {
                 self.land();
                 return;
@@ -158,8 +194,8 @@ impl<'a> Player<'a> {
 
     /// The set-point of this tick; call it once per control tick.
     pub fn tick(&mut self) -> Setpoint {
-        let planned = if self.landing.is_some() {
-            Ok(self.descend())
+        let planned = if self.excursion.is_some() {
+            Ok(self.stray())
         } else {
             self.begin();
             self.play().and_then(|setpoint| self.allowed(setpoint))
@@ -167,7 +203,7 @@ impl<'a> Player<'a> {
         let setpoint = planned.unwrap_or_else(|fault| {
             self.fault = self.fault.or(Some(fault));
             self.land();
-            self.descend()
+            self.stray()
         });
         self.last = setpoint;
         self.tick = self.tick.saturating_add(1);
@@ -190,14 +226,15 @@ impl<'a> Player<'a> {
     }
 
     /// How the axis is.
+    #[inline(never)]
     pub fn status(&self) -> Status {
         let after = |end: u64| end.saturating_sub(self.tick);
         let armed_end = self.armed.and_then(|armed| {
             let table = self.slot(armed.side).checked()?;
             Some(armed.tick.saturating_add(ticks_until(table.duration(), self.config.tick_ns)))
         });
-        let landed = self.landing.as_ref().map(|landing| self.tick.saturating_add(landing.left()));
-        let end = landed.or(armed_end).or(self.playing.map(|p| p.end)).unwrap_or(self.tick);
+        let strayed = self.excursion.as_ref().map(|way| self.tick.saturating_add(way.left()));
+        let end = strayed.or(armed_end).or(self.playing.map(|p| p.end)).unwrap_or(self.tick);
         Status {
             state: self.state(),
             fault: self.fault,
@@ -220,8 +257,11 @@ impl<'a> Player<'a> {
         let (a, b) = (self.a.number(), self.b.number());
         if self.fault.is_some() {
             State::Fault
-        } else if self.landing.is_some() {
-            State::Stopping
+        } else if let Some(excursion) = &self.excursion {
+            match excursion {
+                Excursion::Landing(_) => State::Stopping,
+                Excursion::Approach(_) => State::Moving,
+            }
         } else if self.playing.is_some() {
             State::Running
         } else if self.armed.is_some() {
@@ -239,21 +279,42 @@ impl<'a> Player<'a> {
 
     /// Leaves the path for the shortest way to rest; tables are forgotten. At rest there is nothing to do.
     fn land(&mut self) {
-        if self.landing.is_none() && !self.last.done {
+        let lands = matches!(self.excursion, Some(Excursion::Landing(_)));
+        if !lands && !self.last.done {
             let AxisConfig { limits, tick_ns, .. } = self.config;
             // Without one, as when the set-point is no number, standing still at once is all that is left.
-            self.landing = Landing::new(&self.last, &limits, tick_ns).ok();
+            self.excursion = Landing::new(&self.last, &limits, tick_ns).ok().map(Excursion::Landing);
         }
         (self.playing, self.armed) = (None, None);
         self.clear_unused();
     }
 
-    /// The next set-point on the way to rest.
-    fn descend(&mut self) -> Setpoint {
-        let Some(landing) = &mut self.landing else { return Setpoint::at_rest(self.last.position) };
-        let setpoint = landing.next();
+    /// Sets out for a position, from rest or from the way to another one.
+    #[inline(never)]
+    fn approach(&mut self, position: i64, velocity: Option<f32>) -> Result<(), Reject> {
+        self.refuse_in_fault()?;
+        if self.playing.is_some() || self.armed.is_some() {
+            return Err(Reject::Busy);
+        }
+        let AxisConfig { mut limits, tick_ns, travel, .. } = self.config;
+        let slower = velocity.unwrap_or(limits.velocity);
+        let sensible = slower > 0.0 && travel.is_none_or(|[low, high]| (low..=high).contains(&position));
+        if !sensible {
+            return Err(Reject::Target);
+        }
+        limits.velocity = slower.min(limits.velocity);
+        let approach = Approach::new(&self.last, position, &limits, tick_ns).map_err(|_| Reject::Target)?;
+        self.excursion = Some(Excursion::Approach(approach));
+        self.clear_unused();
+        Ok(())
+    }
+
+    /// The next set-point of a motion without a table.
+    fn stray(&mut self) -> Setpoint {
+        let Some(excursion) = &mut self.excursion else { return Setpoint::at_rest(self.last.position) };
+        let setpoint = excursion.next();
         if setpoint.done {
-            self.landing = None;
+            self.excursion = None;
             self.has_played = true;
         }
         setpoint
@@ -316,6 +377,7 @@ impl<'a> Player<'a> {
         Ok(setpoint)
     }
 
+    #[inline(never)]
     fn open(&mut self, header: TableHeader) -> Result<(), Reject> {
         self.refuse_in_fault()?;
         self.clear_unused();
@@ -341,6 +403,7 @@ impl<'a> Player<'a> {
     }
 
     /// Checks a complete table, and says so.
+    #[inline(never)]
     fn check(&mut self, number: u32) -> Result<(), Reject> {
         let config = self.config;
         let position = self.next_position();
@@ -374,10 +437,11 @@ impl<'a> Player<'a> {
         }
     }
 
+    #[inline(never)]
     fn start(&mut self, number: u32, tick: u64) -> Result<(), Reject> {
         self.refuse_in_fault()?;
         let side = self.side_of(number).ok_or(Reject::NotReady)?;
-        if self.landing.is_some() {
+        if self.excursion.is_some() {
             return Err(Reject::Busy);
         }
         if self.playing.is_some_and(|p| p.side == side) {
@@ -407,14 +471,15 @@ impl<'a> Player<'a> {
     /// Where the axis will stand when all that it must still play has been played [counts].
     fn next_position(&self) -> i64 {
         let armed = self.armed.and_then(|armed| Some(self.slot(armed.side).checked()?.axis().end));
-        let landed = self.landing.as_ref().map(Landing::end);
-        landed.or(armed).or(self.playing.map(|p| p.position)).unwrap_or(self.last.position)
+        let strayed = self.excursion.as_ref().map(Excursion::end);
+        strayed.or(armed).or(self.playing.map(|p| p.position)).unwrap_or(self.last.position)
     }
 
     fn refuse_in_fault(&self) -> Result<(), Reject> {
         if self.fault.is_some() { Err(Reject::Fault) } else { Ok(()) }
     }
 
+    #[inline(never)]
     fn answer(&mut self, message: DriveMessage) {
         if self.answers.is_full() {
             self.answers.pop_front();

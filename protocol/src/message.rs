@@ -53,6 +53,14 @@ pub enum HostMessage<'a> {
     Identify,
     /// Comes to rest as fast as the axis' own limits allow, off the path if need be, and forgets all tables.
     QuickStop,
+    /// Goes to a position and comes to rest there, in the least time that the axis' own limits allow. It may be given
+    /// again on the way, with another position; while a table plays or is armed it is refused.
+    MoveTo {
+        /// Where to [counts].
+        position: i64,
+        /// No faster than this [counts/s]; none: as fast as the axis may be.
+        velocity: Option<f32>,
+    },
 }
 
 /// A part of a table.
@@ -142,6 +150,8 @@ pub enum State {
     Fault,
     /// Comes to rest off the path.
     Stopping,
+    /// On its way to a position.
+    Moving,
 }
 
 /// Why a drive gave up.
@@ -214,6 +224,8 @@ pub enum Reject {
     },
     /// The drive is in fault.
     Fault,
+    /// The position is outside the travel, or the velocity is no positive number.
+    Target,
 }
 
 /// Why a message could not be written or read.

@@ -11,15 +11,15 @@ Limits{velocity f32,acceleration f32,jerk ?f32}\
 geometry{length<<1|more,spans-2}span{step,code dd u24}control{point dd i64}\
 Part[Shared,Axis]\
 HostMessage[Open TableHeader,OpenAxis AxisHeader,Data{table u32,part Part,offset u32,bytes [u8]},\
-Seal{table u32,part Part,crc u32},Start{table u32,tick u64},Stop,Identify,QuickStop]\
+Seal{table u32,part Part,crc u32},Start{table u32,tick u64},Stop,Identify,QuickStop,MoveTo{position i64,velocity ?f32}]\
 DriveMessage[Ready{table u32,ticks u64,crc [u32;2]},Reject{table u32,reason Reject},Status,Identity]\
 Status{state State,fault ?Fault,tick u64,position i64,fill u64}\
 Identity{version [u8;3],format u8,schema u64,axis u8,tick_ns u32,limits Limits,room u32}\
-State[Idle,Receiving,Ready,Armed,Running,Holding,Fault,Stopping]\
+State[Idle,Receiving,Ready,Armed,Running,Holding,Fault,Stopping,Moving]\
 Fault[Table{table u32,error TableError},Limit AxisLimit]\
 Reject[Table TableError,Checksum Part,Incomplete{part Part,received u32},NoRoom{needed u64,available u64},\
 Tick{tick_ns u32},Axis{axis u8},Limits,Position{position i64},Busy,NotOpen,NotReady,Late{tick u64},\
-Overlap{tick u64},Fault]\
+Overlap{tick u64},Fault,Target]\
 Stream[Geometry,Spans,Controls]\
 HeaderField[Version,Table,Spans,GeometrySpans,StepExponent,QScale,Tick,Length,FractionBits,Limits]\
 TableError[Header HeaderField,Truncated{stream,index u32},Malformed{stream,index u32},\

@@ -1,5 +1,5 @@
 //! A quick stop at any instant of any table, and faults on the way: the axis comes to rest within its limits.
-#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests fail as tests do")]
 
 use firmware_core::evaluate::{Cursor, Setpoint};
 use firmware_core::player::{AxisConfig, Player};

@@ -7,6 +7,7 @@ use super::real::Real;
 /// Integrates the segments of a motion: the first has to begin at `from`, each to end where the next one begins, the last
 /// one where the motion ends; and velocities have to keep their limits after the first segments, `outside` of them, which
 /// lead back into these. `clock` is how well its times are known.
+#[inline(never)]
 pub(super) fn check<R: Real, const N: usize>(
     profile: &Profile<R, N>,
     from: &State<R>,

@@ -78,6 +78,7 @@ impl<R: Real> Chain<R> {
         self.link_of(z, self.c + z * z)
     }
 
+    #[inline(never)]
     fn link_of(&self, z: R, square: R) -> Link<R> {
         let Task { v0, a0, v1, a1, a_up, a_down, j_up, j_down, .. } = self.task;
         let free = square.root();

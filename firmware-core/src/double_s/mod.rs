@@ -91,6 +91,7 @@ struct Inside<R> {
 }
 
 /// Leads the start back into its limits.
+#[inline(never)]
 fn enter<R: Real>(
     from: &State<R>,
     to: &State<R>,

@@ -100,6 +100,7 @@ impl<R: Real> Solution<R> {
     }
 
     /// Its parts, from position 0 on, in order; some may take no time.
+    #[inline(never)]
     pub(super) fn parts(&self) -> [Segment<R>; PARTS] {
         let (times, jerks) = self.schedule();
         let knots = self.knots(&times);

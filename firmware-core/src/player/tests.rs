@@ -136,6 +136,54 @@ fn a_set_point_beyond_the_limits_is_a_fault_and_comes_to_rest() {
 }
 
 #[test]
+fn an_axis_goes_where_it_is_sent_and_changes_its_mind_on_the_way() {
+    let (mut a, mut b) = ([0; 64], [0; 64]);
+    let config = AxisConfig { travel: Some([-2_000_000, 2_000_000]), ..config() };
+    let mut player = Player::new(config, &mut a, &mut b);
+    let go = |player: &mut Player<'_>, position, velocity| {
+        player.handle(&HostMessage::MoveTo { position, velocity });
+        match player.poll_answer() {
+            Some(DriveMessage::Reject { reason, .. }) => Some(reason),
+            _ => None,
+        }
+    };
+    for (position, velocity) in [(2_000_001, None), (0, Some(0.0)), (0, Some(f32::NAN)), (0, Some(-1.0))] {
+        assert_eq!(go(&mut player, position, velocity), Some(Reject::Target));
+    }
+    assert_eq!(go(&mut player, 1_234_567, None), None);
+    assert_eq!(player.status().state, State::Moving);
+    let left = player.status().fill;
+    let away = (0..left / 2).map(|_| player.tick()).last().unwrap();
+    assert!(away.velocity > 0.9 * LIMITS.velocity);
+    // Back, slower than it is: the way back into that limit comes first.
+    assert_eq!(go(&mut player, -5, Some(0.5 * LIMITS.velocity)), None);
+    let mut before = away;
+    while !before.done {
+        let now = player.tick();
+        assert!(
+            (now.velocity - before.velocity).abs() <= 1.01e-3 * LIMITS.acceleration,
+            "{before:?} {now:?}"
+        );
+        before = now;
+    }
+    assert_eq!((before, player.status().state), (Setpoint::at_rest(-5), State::Holding));
+    // Not while a table plays or waits.
+    let mut moved = Player::new(self::config(), &mut a, &mut b);
+    bring(&mut moved, 4);
+    moved.handle(&HostMessage::Start { table: 4, tick: 50 });
+    assert!(matches!(moved.poll_answer(), Some(DriveMessage::Ready { .. })));
+    assert_eq!(go(&mut moved, 7, None), Some(Reject::Busy));
+    moved.handle(&HostMessage::QuickStop);
+    assert_eq!(go(&mut moved, 70_000, None), None);
+    // A quick stop ends a move, too.
+    (0..20).for_each(|_| {
+        moved.tick();
+    });
+    moved.handle(&HostMessage::QuickStop);
+    assert_eq!(moved.status().state, State::Stopping);
+}
+
+#[test]
 fn a_quick_stop_at_rest_forgets_tables_and_no_more() {
     let (mut a, mut b) = ([0; 64], [0; 64]);
     let mut player = Player::new(config(), &mut a, &mut b);

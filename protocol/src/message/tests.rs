@@ -38,7 +38,7 @@ const AXIS: AxisHeader = AxisHeader {
 fn host_messages_are_pinned() {
     let data = HostMessage::Data { table: 300, part: Part::Axis, offset: 5, bytes: &[7, 8] };
     let seal = HostMessage::Seal { table: 1, part: Part::Shared, crc: 0x80 };
-    let cases: [(HostMessage<'_>, &[u8]); 8] = [
+    let cases: [(HostMessage<'_>, &[u8]); 10] = [
         (HostMessage::Open(HEADER), &[0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10]),
         (
             HostMessage::OpenAxis(AXIS),
@@ -50,6 +50,8 @@ fn host_messages_are_pinned() {
         (HostMessage::Stop, &[5]),
         (HostMessage::Identify, &[6]),
         (HostMessage::QuickStop, &[7]),
+        (HostMessage::MoveTo { position: -1, velocity: None }, &[8, 1, 0]),
+        (HostMessage::MoveTo { position: 1, velocity: Some(1.0) }, &[8, 2, 1, 0, 0, 0x80, 0x3f]),
     ];
     for (message, golden) in cases {
         assert_eq!(bytes(&message), golden, "{message:?}");
@@ -72,7 +74,8 @@ fn drive_messages_are_pinned() {
         limits: AXIS.limits,
         room: 4096,
     };
-    let cases: [(DriveMessage, &[u8]); 24] = [
+    let cases: [(DriveMessage, &[u8]); 25] = [
+        (reject(Reject::Target), &[1, 1, 14]),
         (
             DriveMessage::Identity(identity),
             &[
@@ -112,7 +115,7 @@ fn drive_messages_are_pinned() {
 
 #[test]
 fn the_schema_is_pinned() {
-    assert_eq!(schema::HASH, 0x5ec1_d1c8_d668_aa7d, "{:#018x}", schema::HASH);
+    assert_eq!(schema::HASH, 0xf386_9179_7a35_1c27, "{:#018x}", schema::HASH);
 }
 
 #[test]
@@ -149,7 +152,7 @@ fn the_longest_headers_have_checksums() {
 #[test]
 fn bytes_behind_a_message_are_refused() {
     assert_eq!(decode::<HostMessage<'_>>(&[5, 0]), Err(MessageError::LeftOver));
-    assert_eq!(decode::<HostMessage<'_>>(&[8]), Err(MessageError::Malformed));
+    assert_eq!(decode::<HostMessage<'_>>(&[9]), Err(MessageError::Malformed));
     assert_eq!(decode::<HostMessage<'_>>(&[]), Err(MessageError::Malformed));
     assert_eq!(encode(&HostMessage::Open(HEADER), &mut [0; 4]), Err(MessageError::NoRoom));
 }
