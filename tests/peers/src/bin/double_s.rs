@@ -7,6 +7,7 @@ use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
 use firmware_core::double_s::{Bounds, DoubleSError, MotionLimits, State, plan};
+use host_sim::group::{self, Axis, Sync, Target};
 use rsruckig::prelude::*;
 
 /// Cases per child process.
@@ -19,7 +20,9 @@ const ARRIVES: f64 = 1e-12;
 const LONGER: f64 = 1e-9;
 
 /// Kinds of cases.
-const KINDS: [&str; 4] = ["general", "asymmetric", "degenerate", "outside"];
+const KINDS: [&str; 5] = ["general", "asymmetric", "degenerate", "outside", GROUP];
+/// Three axes that arrive together.
+const GROUP: &str = "three axes, time";
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
@@ -50,6 +53,7 @@ impl Tally {
     }
 }
 
+#[derive(Debug)]
 struct Case {
     from: State<f64>,
     to: State<f64>,
@@ -108,29 +112,43 @@ impl Chance {
     }
 }
 
-/// What the peer makes of a case: duration, and whether its phases arrive; `None` where it has no answer.
-fn peer(otg: &mut Ruckig<1, ThrowErrorHandler>, case: &Case) -> (Option<(f64, bool)>, u64) {
-    let mut input = InputParameter::<1>::new(None);
-    input.current_position[0] = case.from.position;
-    input.current_velocity[0] = case.from.velocity;
-    input.current_acceleration[0] = case.from.acceleration;
-    input.target_position[0] = case.to.position;
-    input.target_velocity[0] = case.to.velocity;
-    input.target_acceleration[0] = case.to.acceleration;
-    let MotionLimits { velocity, acceleration, jerk } = case.limits;
-    input.max_velocity[0] = velocity.max;
-    input.max_acceleration[0] = acceleration.max;
-    input.max_jerk[0] = jerk.max;
-    input.min_velocity = Some(daov_stack![velocity.min]);
-    input.min_acceleration = Some(daov_stack![acceleration.min]);
-    let mut trajectory = Trajectory::<1>::new(None);
+/// What the peer makes of axes that arrive together: duration, and whether their phases arrive; `None` where it has no
+/// answer.
+fn peer<const N: usize>(
+    otg: &mut Ruckig<N, ThrowErrorHandler>,
+    cases: &[Case; N],
+) -> (Option<(f64, bool)>, u64) {
+    let mut input = InputParameter::<N>::new(None);
+    input.synchronization = Synchronization::Time;
+    let (mut v_min, mut a_min) = (input.max_velocity.clone(), input.max_velocity.clone());
+    for (axis, case) in cases.iter().enumerate() {
+        input.current_position[axis] = case.from.position;
+        input.current_velocity[axis] = case.from.velocity;
+        input.current_acceleration[axis] = case.from.acceleration;
+        input.target_position[axis] = case.to.position;
+        input.target_velocity[axis] = case.to.velocity;
+        input.target_acceleration[axis] = case.to.acceleration;
+        let MotionLimits { velocity, acceleration, jerk } = case.limits;
+        input.max_velocity[axis] = velocity.max;
+        input.max_acceleration[axis] = acceleration.max;
+        input.max_jerk[axis] = jerk.max;
+        v_min[axis] = velocity.min;
+        a_min[axis] = acceleration.min;
+    }
+    (input.min_velocity, input.min_acceleration) = (Some(v_min), Some(a_min));
+    let mut trajectory = Trajectory::<N>::new(None);
     let begun = Instant::now();
     let result = otg.calculate(&input, &mut trajectory);
     let took = begun.elapsed().as_nanos() as u64;
     if !matches!(result, Ok(RuckigResult::Working | RuckigResult::Finished)) {
         return (None, took);
     }
-    let profile = &trajectory.profiles[0][0];
+    let arrive = cases.iter().enumerate().all(|(axis, case)| arrives(&trajectory.profiles[0][axis], case));
+    (Some((trajectory.get_duration(), arrive)), took)
+}
+
+/// Whether the phases of a profile of the peer's arrive.
+fn arrives(profile: &Profile, case: &Case) -> bool {
     let brake = profile.brake.t.iter().zip(&profile.brake.j);
     let mut s = case.from;
     let (mut path, mut fastest, mut steepest) = (0.0f64, s.velocity.abs(), s.acceleration.abs());
@@ -144,27 +162,41 @@ fn peer(otg: &mut Ruckig<1, ThrowErrorHandler>, case: &Case) -> (Option<(f64, bo
         path += t * before.max(s.velocity.abs());
         (fastest, steepest) = (fastest.max(s.velocity.abs()), steepest.max(s.acceleration.abs()));
     }
-    let arrives = (s.position - case.to.position).abs() <= ARRIVES * path
+    (s.position - case.to.position).abs() <= ARRIVES * path
         && (s.velocity - case.to.velocity).abs() <= ARRIVES * fastest
-        && (s.acceleration - case.to.acceleration).abs() <= ARRIVES * steepest;
-    (Some((trajectory.get_duration(), arrives)), took)
+        && (s.acceleration - case.to.acceleration).abs() <= ARRIVES * steepest
 }
 
-/// One chunk of cases, printed as the fields of a tally.
-fn child(kind: &str, seed: u64, count: u64) {
+/// Our duration of axes that arrive together.
+fn ours(cases: &[Case]) -> Result<f64, DoubleSError> {
+    if let [case] = cases {
+        return Ok(plan(&case.from, &case.to, &case.limits)?.duration());
+    }
+    let axes: Vec<Axis> = cases
+        .iter()
+        .map(|case| Axis { from: case.from, to: Target::State(case.to), limits: case.limits })
+        .collect();
+    group::plan(&axes, Sync::Time).map(|motion| motion.duration).map_err(|e| e.error)
+}
+
+/// One chunk of cases of `N` axes, printed as the fields of a tally.
+fn child<const N: usize>(kind: &str, seed: u64, count: u64) {
     let mut chance = Chance(fastrand::Rng::with_seed(seed));
-    let mut otg = Ruckig::<1, ThrowErrorHandler>::new(None, 0.001);
+    let mut otg = Ruckig::<N, ThrowErrorHandler>::new(None, 0.001);
     let mut tally = Tally::default();
     for _ in 0..count {
-        let case = chance.case(kind);
+        let cases: [Case; N] = std::array::from_fn(|_| chance.case(kind));
         let begun = Instant::now();
-        let ours = plan(&case.from, &case.to, &case.limits);
+        let found = ours(&cases);
         let took = begun.elapsed().as_nanos() as u64;
         tally.cases += 1;
-        let ours = match ours {
-            Ok(profile) => profile.duration(),
+        let seconds = match found {
+            Ok(seconds) => seconds,
             Err(DoubleSError::Precision) => {
                 tally.ours_failed += 1;
+                if tally.ours_failed <= 3 {
+                    eprintln!("failed: {cases:?}");
+                }
                 continue;
             }
             // The target cannot be kept within the limits: the peer is not asked.
@@ -173,19 +205,19 @@ fn child(kind: &str, seed: u64, count: u64) {
                 continue;
             }
         };
-        let (theirs, peer_took) = peer(&mut otg, &case);
+        let (theirs, peer_took) = peer(&mut otg, &cases);
         tally.ours_ns += took;
         tally.peer_ns += peer_took;
         match theirs {
             None => tally.peer_failed += 1,
             Some((_, false)) => tally.peer_misses += 1,
-            Some((seconds, true)) => {
-                if ours > seconds * (1.0 + LONGER) {
+            Some((other, true)) => {
+                if seconds > other * (1.0 + LONGER) {
                     tally.ours_longer += 1;
                     if tally.ours_longer <= 3 {
-                        eprintln!("longer: {ours} {seconds} {:?} {:?} {:?}", case.from, case.to, case.limits);
+                        eprintln!("longer: {seconds} {other} {cases:?}");
                     }
-                } else if seconds > ours * (1.0 + LONGER) {
+                } else if other > seconds * (1.0 + LONGER) {
                     tally.peer_longer += 1;
                 }
             }
@@ -226,7 +258,9 @@ fn main() -> ExitCode {
     let number =
         |index: usize, default: u64| words.get(index).and_then(|w| w.parse().ok()).unwrap_or(default);
     if words.first().is_some_and(|w| w == "child") {
-        child(words.get(1).map_or("general", String::as_str), number(2, 1), number(3, CHUNK));
+        let kind = words.get(1).map_or("general", String::as_str);
+        let run = if kind == GROUP { child::<3> } else { child::<1> };
+        run(kind, number(2, 1), number(3, CHUNK));
         return ExitCode::SUCCESS;
     }
     let (cases, seed) = (number(0, 1_000_000), number(1, 1));
