@@ -368,7 +368,8 @@ pub struct InspectArgs {
 #[command(after_help = "\
 The image is built with cargo from firmware/, here or in a folder above.
 
-Example: feedspline flash --board emulated")]
+Example: feedspline flash --board emulated
+         feedspline flash --board stm32g4 --node 2 --line /dev/ttyACM0")]
 pub struct FlashArgs {
     /// Where it runs
     #[arg(long, value_enum, value_name = "NAME")]
@@ -379,6 +380,9 @@ pub struct FlashArgs {
     /// A finished image, instead of building one
     #[arg(long, value_name = "FILE")]
     pub image: Option<PathBuf>,
+    /// Device file of the SLCAN adapter on the drive's bus, to ask it
+    #[arg(long, value_name = "FILE")]
+    pub line: Option<PathBuf>,
     /// What to say.
     #[command(flatten)]
     pub speech: Speech,
@@ -389,6 +393,8 @@ pub struct FlashArgs {
 pub enum Board {
     /// A Cortex-M4F in the emulator QEMU
     Emulated,
+    /// An STM32G474 behind a debug probe; never tried on hardware by its makers
+    Stm32g4,
 }
 
 /// Which axis limits a plan keeps.

@@ -20,5 +20,6 @@ pub mod report;
 pub mod scenario;
 pub mod servo;
 pub mod setpoint_hash;
+pub mod slcan_line;
 pub mod statistics;
 pub mod trace;

@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use host_sim::emulator::{Emulator, EmulatorError, PROGRAM};
+use host_sim::emulator::{Emulator, PROGRAM};
+use host_sim::slcan_line::{LineError, SlcanLine};
 use protocol::bus::Node;
+use protocol::message::Identity;
 use protocol::schema;
 
 use super::Verdict;
@@ -15,8 +17,12 @@ use crate::failure::Failure;
 use crate::json::FlashJson;
 use crate::summary;
 
-/// What the emulated image is built for.
+/// What images are built for.
 const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// What writes an image to a chip through a debug probe, and the chip.
+const PROBE: &str = "probe-rs";
+const CHIP: &str = "STM32G474RETx";
 
 /// How long a drive may take to boot and to answer.
 const PATIENCE: Duration = Duration::from_secs(15);
@@ -29,12 +35,29 @@ pub fn execute(args: &FlashArgs, console: &mut Console<'_>) -> Result<Verdict, F
     let node = Node::new(args.node).ok_or_else(|| {
         Failure::input("--node is a number from 1 to 127").with_help("1 is the first axis.")
     })?;
+    match (args.board, &args.line) {
+        (Board::Emulated, Some(_)) => {
+            return Err(Failure::input("--line says nothing about the emulated board")
+                .with_help("Its line is the emulator's. Leave the option away."));
+        }
+        (Board::Stm32g4, None) => {
+            return Err(Failure::input(
+                "--line is missing: there is no other way to ask the drive who it is",
+            )
+            .with_help("Name the SLCAN adapter on its bus, such as --line /dev/ttyACM0."));
+        }
+        (Board::Emulated, None) | (Board::Stm32g4, Some(_)) => {}
+    }
     let image = match &args.image {
         Some(image) => existing(image)?,
         None => build(args.board, node)?,
     };
-    let identity = match args.board {
-        Board::Emulated => emulated(&image, node)?,
+    let identity = match &args.line {
+        None => emulated(&image, node)?,
+        Some(device) => {
+            write(&image)?;
+            ask(device, node)?
+        }
     };
     let matches = identity.schema == schema::HASH;
     let told = FlashJson::of(&args::name(args.board), &image, node, &identity, matches);
@@ -87,23 +110,65 @@ fn sources(board: &str) -> Result<PathBuf, Failure> {
     })
 }
 
-fn emulated(image: &Path, node: Node) -> Result<protocol::message::Identity, Failure> {
-    let failed = |error: EmulatorError| {
-        let help = match error {
-            EmulatorError::Start(_) => {
-                format!("Install {PROGRAM}, on Debian with apt-get install {PROGRAM}.")
-            }
-            EmulatorError::Ended => {
-                "The file is no image for this board, or the emulator is too old.".to_owned()
-            }
-            EmulatorError::Silent => {
-                format!(
-                    "The image listens to another address than --node {}, or is none of a drive.",
-                    node.number()
-                )
-            }
+fn emulated(image: &Path, node: Node) -> Result<Identity, Failure> {
+    let failed = |error: LineError| {
+        let (message, help) = match error {
+            LineError::Open(e) => (
+                format!("{PROGRAM} does not start: {e}"),
+                format!("Install {PROGRAM}, on Debian with apt-get install {PROGRAM}."),
+            ),
+            LineError::Broken => (
+                "the emulator has ended".to_owned(),
+                "The file is no image for this board, or the emulator is too old.".to_owned(),
+            ),
+            LineError::Silent => (error.to_string(), silent(node)),
         };
-        Failure::input(error.to_string()).in_file(image).with_help(help)
+        Failure::input(message).in_file(image).with_help(help)
     };
-    Emulator::boot(image).and_then(|mut drive| drive.identify(node, PATIENCE)).map_err(failed)
+    Emulator::boot(image).and_then(|mut drive| drive.line.identify(node, PATIENCE)).map_err(failed)
+}
+
+/// Writes an image to the chip behind the debug probe, and starts it.
+fn write(image: &Path) -> Result<(), Failure> {
+    for (word, file) in [("download", Some(image)), ("reset", None)] {
+        let output = Command::new(PROBE)
+            .args([word, "--chip", CHIP])
+            .args(file)
+            .stdin(Stdio::null())
+            .output()
+            .map_err(|e| {
+                Failure::input(format!("{PROBE} does not start: {e}"))
+                    .with_help("Install it from https://probe.rs, and connect the board's debug probe.")
+            })?;
+        if !output.status.success() {
+            let said = String::from_utf8_lossy(&output.stderr);
+            let last =
+                said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("it does not say why").trim();
+            return Err(Failure::input(format!("{PROBE} {word} has failed: {last}"))
+                .in_file(image)
+                .with_help(format!(
+                    "`{PROBE} list` shows the probes that are connected; the chip is {CHIP}."
+                )));
+        }
+    }
+    Ok(())
+}
+
+/// Asks the drive on the bus of an adapter.
+fn ask(device: &Path, node: Node) -> Result<Identity, Failure> {
+    SlcanLine::adapter(device).and_then(|mut line| line.identify(node, PATIENCE)).map_err(|error| {
+        let help = match error {
+            LineError::Open(_) => "Check the name of the device file and who may use it.".to_owned(),
+            LineError::Broken => "The adapter has gone: check its cable.".to_owned(),
+            LineError::Silent => silent(node),
+        };
+        Failure::input(error.to_string()).in_file(device).with_help(help)
+    })
+}
+
+fn silent(node: Node) -> String {
+    let number = node.number();
+    format!(
+        "The image listens to another address than --node {number}, is none of a drive, or its bus is not connected."
+    )
 }

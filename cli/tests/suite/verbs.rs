@@ -334,6 +334,9 @@ fn flash_tells_whether_the_drive_speaks_this_protocol() {
     assert!(said.err.contains("/does/not/exist"), "{}", said.err);
     assert_eq!(say(&GOOD, &["flash", "--board", "emulated", "--node", "0"]).status, 2);
     assert_eq!(say(&GOOD, &["flash", "--board", "toaster"]).status, 2);
+    let said = say(&GOOD, &["flash", "--board", "stm32g4"]);
+    assert!(said.status == 2 && said.err.contains("--line is missing"), "{}", said.err);
+    assert_eq!(say(&GOOD, &["flash", "--board", "emulated", "--line", "/dev/null"]).status, 2);
 }
 
 #[test]
