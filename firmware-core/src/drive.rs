@@ -78,6 +78,16 @@ impl<'a> Drive<'a> {
         self.player.tick()
     }
 
+    /// Tells where the axis really is, after [`Drive::tick`].
+    pub fn observe(&mut self, actual: i64) {
+        self.player.observe(actual);
+    }
+
+    /// Tells what a tick has cost, in whatever the board counts.
+    pub fn observe_cost(&mut self, count: u32) {
+        self.player.observe_cost(count);
+    }
+
     /// The next frame to send.
     #[inline(never)]
     pub fn poll_transmit(&mut self) -> Option<Frame> {

@@ -18,4 +18,5 @@ pub mod player;
 pub mod proof;
 mod store;
 pub mod table;
+mod telemetry;
 pub mod time;

@@ -16,6 +16,7 @@ use crate::approach::Approach;
 use crate::evaluate::{Cursor, Setpoint};
 use crate::landing::Landing;
 use crate::store::Slot;
+use crate::telemetry::Window;
 use crate::time::{PathClock, ticks_until};
 
 /// Most answers that wait to be sent; when they are not fetched, status is dropped first.
@@ -133,6 +134,7 @@ pub struct Player<'a> {
     armed: Option<Armed>,
     has_played: bool,
     fault: Option<Fault>,
+    window: Window,
     answers: Deque<DriveMessage, ANSWERS>,
 }
 
@@ -151,6 +153,7 @@ impl<'a> Player<'a> {
             armed: None,
             has_played: false,
             fault: None,
+            window: Window::default(),
             answers: Deque::new(),
         }
     }
@@ -215,9 +218,24 @@ impl<'a> Player<'a> {
                 if self.answers.len() < ANSWERS / 2 {
                     self.answer(DriveMessage::Status(status));
                 }
+                let fill_ms = status.fill.saturating_mul(u64::from(self.config.tick_ns)) / 1_000_000;
+                let telemetry = self.window.take(u32::try_from(fill_ms).unwrap_or(u32::MAX));
+                if let Some(telemetry) = telemetry.filter(|_| self.answers.len() < ANSWERS / 2) {
+                    self.answer(DriveMessage::Telemetry(telemetry));
+                }
             }
         }
         setpoint
+    }
+
+    /// Tells where the axis really is, after [`Player::tick`]: for the telemetry that follows each status.
+    pub fn observe(&mut self, actual: i64) {
+        self.window.follow(self.last.position, actual);
+    }
+
+    /// Tells what a tick has cost, in whatever the board counts.
+    pub fn observe_cost(&mut self, count: u32) {
+        self.window.cost(count);
     }
 
     /// The oldest answer that was not fetched.

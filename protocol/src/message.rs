@@ -95,6 +95,23 @@ pub enum DriveMessage {
     Status(Status),
     /// Who the drive is.
     Identity(Identity),
+    /// How well it follows; after a status, from drives that know their position.
+    Telemetry(Telemetry),
+}
+
+/// How an axis has followed since the telemetry before.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Telemetry {
+    /// Over how many ticks.
+    pub ticks: u32,
+    /// Largest following error [counts].
+    pub following_max: u32,
+    /// Its root mean square [counts], to 7 %.
+    pub following_rms: f32,
+    /// How long the drive can go on with what it may play [ms].
+    pub fill_ms: u32,
+    /// What the dearest tick has cost, in what the board counts; 0: it does not.
+    pub worst_tick: u32,
 }
 
 /// What a drive tells of itself before anything else is said.

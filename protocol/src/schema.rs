@@ -12,9 +12,10 @@ geometry{length<<1|more,spans-2}span{step,code dd u24}control{point dd i64}\
 Part[Shared,Axis]\
 HostMessage[Open TableHeader,OpenAxis AxisHeader,Data{table u32,part Part,offset u32,bytes [u8]},\
 Seal{table u32,part Part,crc u32},Start{table u32,tick u64},Stop,Identify,QuickStop,MoveTo{position i64,velocity ?f32}]\
-DriveMessage[Ready{table u32,ticks u64,crc [u32;2]},Reject{table u32,reason Reject},Status,Identity]\
+DriveMessage[Ready{table u32,ticks u64,crc [u32;2]},Reject{table u32,reason Reject},Status,Identity,Telemetry]\
 Status{state State,fault ?Fault,tick u64,position i64,fill u64}\
 Identity{version [u8;3],format u8,schema u64,axis u8,tick_ns u32,limits Limits,room u32}\
+Telemetry{ticks u32,following_max u32,following_rms f32,fill_ms u32,worst_tick u32}\
 State[Idle,Receiving,Ready,Armed,Running,Holding,Fault,Stopping,Moving]\
 Fault[Table{table u32,error TableError},Limit AxisLimit]\
 Reject[Table TableError,Checksum Part,Incomplete{part Part,received u32},NoRoom{needed u64,available u64},\

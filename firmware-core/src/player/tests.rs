@@ -184,6 +184,29 @@ fn an_axis_goes_where_it_is_sent_and_changes_its_mind_on_the_way() {
 }
 
 #[test]
+fn telemetry_follows_each_status_where_the_position_is_known() {
+    let (mut a, mut b) = ([0; 64], [0; 64]);
+    let mut player = Player::new(AxisConfig { status_ticks: 10, ..config() }, &mut a, &mut b);
+    for tick in 0..10 {
+        player.tick();
+        player.observe(100 + tick % 2);
+    }
+    // The tenth position comes after the tenth tick, and counts for the next window.
+    for (ticks, most) in [(9, 1), (1, 1)] {
+        let answers: Vec<_> = core::iter::from_fn(|| player.poll_answer()).collect();
+        let [DriveMessage::Status(_), DriveMessage::Telemetry(told)] = answers[..] else {
+            panic!("{answers:?}")
+        };
+        assert_eq!((told.ticks, told.following_max), (ticks, most));
+        (0..10).for_each(|_| {
+            player.tick();
+        });
+    }
+    assert!(matches!(player.poll_answer(), Some(DriveMessage::Status(_))));
+    assert!(player.poll_answer().is_none(), "nobody has told anything");
+}
+
+#[test]
 fn a_quick_stop_at_rest_forgets_tables_and_no_more() {
     let (mut a, mut b) = ([0; 64], [0; 64]);
     let mut player = Player::new(config(), &mut a, &mut b);

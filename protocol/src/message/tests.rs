@@ -74,7 +74,10 @@ fn drive_messages_are_pinned() {
         limits: AXIS.limits,
         room: 4096,
     };
-    let cases: [(DriveMessage, &[u8]); 25] = [
+    let telemetry =
+        Telemetry { ticks: 200, following_max: 3, following_rms: 1.0, fill_ms: 5, worst_tick: 90 };
+    let cases: [(DriveMessage, &[u8]); 26] = [
+        (DriveMessage::Telemetry(telemetry), &[4, 0xc8, 1, 3, 0, 0, 0x80, 0x3f, 5, 90]),
         (reject(Reject::Target), &[1, 1, 14]),
         (
             DriveMessage::Identity(identity),
@@ -115,7 +118,7 @@ fn drive_messages_are_pinned() {
 
 #[test]
 fn the_schema_is_pinned() {
-    assert_eq!(schema::HASH, 0xf386_9179_7a35_1c27, "{:#018x}", schema::HASH);
+    assert_eq!(schema::HASH, 0x80a5_be70_4df7_a795, "{:#018x}", schema::HASH);
 }
 
 #[test]
