@@ -8,6 +8,8 @@ use std::process::Command;
 
 use crate::shell::{Step, cargo, cargo_command, skip};
 
+/// How images are built: where they are looked for, whatever the environment says.
+const BUILD: [&str; 5] = ["build", "--release", "--locked", "--target-dir", "target"];
 /// What the images are built for.
 const TARGET: &str = "thumbv7em-none-eabihf";
 /// The emulator, and the board it plays: one instruction takes 1024 ns of its timer's time.
@@ -49,7 +51,7 @@ pub(crate) fn run(root: &Path) -> Step {
     let folder = root.join("firmware/emulated");
     let chip = root.join("firmware/stm32g4");
     for features in [&[][..], &["--features", "fd"]] {
-        let args = [&["build", "--release", "--locked"], features].concat();
+        let args = [&BUILD, features].concat();
         cargo(&chip, &args)?;
         image::check_instructions(&chip.join("target").join(TARGET).join("release/drive"))?;
     }
@@ -57,7 +59,7 @@ pub(crate) fn run(root: &Path) -> Step {
     let host = host(root, &tables)?;
     let tables = tables.display().to_string();
     eprintln!("$ cargo build --release (firmware/emulated)");
-    let built = cargo_command(&folder, &["build", "--release", "--locked"])
+    let built = cargo_command(&folder, &BUILD)
         .env("FEEDSPLINE_TABLES", &tables)
         .status()
         .map_err(|e| format!("cargo does not start: {e}"))?;
