@@ -211,11 +211,11 @@ proptest! {
         let new = Rules { limits: &limits, caps: &caps };
         let found = match again(&table, knot, old, new) {
             Ok(found) => found,
-            // All that is left may be little more than the way to rest, and ramps of one shape do not use every chance:
-            // of 3000 random overrides 16 are refused, three with 1.0 to 1.1 s left.
+            // All that is left may be the way to rest, at full limits: of 3000 random overrides 12 are refused, with
+            // 0.74 s left at most.
             Err(RetimeError::Unmet { .. }) => {
                 let left: f64 = (knot..table.spans()).map(|i| table.law(i).duration()).sum();
-                prop_assert!(factor < 1.0 && knot > 0 && left < 1.5, "{left} s are enough to slow down");
+                prop_assert!(factor < 1.0 && knot > 0 && left < 1.0, "{left} s are enough to slow down");
                 return Ok(());
             }
             Err(fault) => panic!("{fault}"),
