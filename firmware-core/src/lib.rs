@@ -8,11 +8,10 @@
 //! [`drive`] puts it behind CAN frames.
 #![no_std]
 
-mod approach;
+mod course;
 pub mod double_s;
 pub mod drive;
 pub mod evaluate;
-mod landing;
 mod math;
 pub mod player;
 pub mod proof;

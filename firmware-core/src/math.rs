@@ -25,6 +25,12 @@ pub(crate) fn nearest(x: f32) -> i32 {
     }
 }
 
+/// As [`nearest`], as far as i64 goes: what is too large for a fraction in f32 is whole.
+pub(crate) fn nearest_long(x: f32) -> i64 {
+    const WHOLE: f32 = 8_388_608.0;
+    if x.abs() < WHOLE { i64::from(nearest(x)) } else { x as i64 }
+}
+
 /// S(z) = sum z^k/(2k+1)!, five terms; exact to f32 for |z| <= 1.21.
 pub(crate) fn s_series(z: f32) -> f32 {
     1.0 + z * (1.0 / 6.0 + z * (1.0 / 120.0 + z * (1.0 / 5_040.0 + z * (1.0 / 362_880.0))))
@@ -75,6 +81,10 @@ mod tests {
         for (x, n) in cases {
             assert_eq!(nearest(x), n, "{x}");
         }
+        assert_eq!(
+            (nearest_long(-2.5), nearest_long(2_199_023_255_552.0), nearest_long(f32::NAN)),
+            (-2, 1 << 41, 0)
+        );
         assert_eq!((nearest(1e30), nearest(-1e30), nearest(f32::NAN)), (i32::MAX, i32::MIN, 0));
     }
 

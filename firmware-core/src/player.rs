@@ -12,9 +12,8 @@ use protocol::message::{DriveMessage, Fault, HostMessage, Identity, Reject, Stat
 use protocol::schema;
 use protocol::table::{AxisLimit, FORMAT_VERSION, Limits, TableHeader};
 
-use crate::approach::Approach;
+use crate::course::Course;
 use crate::evaluate::{Cursor, Setpoint};
-use crate::landing::Landing;
 use crate::store::Slot;
 use crate::telemetry::Window;
 use crate::time::{PathClock, ticks_until};
@@ -87,34 +86,10 @@ struct Armed {
 
 /// Motion without a table.
 #[derive(Clone, Debug)]
-enum Excursion {
-    /// To rest.
-    Landing(Landing),
-    /// To a position.
-    Approach(Approach),
-}
-
-impl Excursion {
-    fn next(&mut self) -> Setpoint {
-        match self {
-            Excursion::Landing(way) => way.next(),
-            Excursion::Approach(way) => way.next(),
-        }
-    }
-
-    fn end(&self) -> i64 {
-        match self {
-            Excursion::Landing(way) => way.end(),
-            Excursion::Approach(way) => way.end(),
-        }
-    }
-
-    fn left(&self) -> u64 {
-        match self {
-            Excursion::Landing(way) => way.left(),
-            Excursion::Approach(way) => way.left(),
-        }
-    }
+struct Excursion {
+    course: Course,
+    /// It only comes to rest.
+    stops: bool,
 }
 
 /// One axis.
@@ -251,7 +226,10 @@ impl<'a> Player<'a> {
             let table = self.slot(armed.side).checked()?;
             Some(armed.tick.saturating_add(ticks_until(table.duration(), self.config.tick_ns)))
         });
-        let strayed = self.excursion.as_ref().map(|way| self.tick.saturating_add(way.left()));
+        let strayed = self
+            .excursion
+            .as_ref()
+            .map(|way| self.tick.saturating_add(way.course.left().unwrap_or(u64::MAX)));
         let end = strayed.or(armed_end).or(self.playing.map(|p| p.end)).unwrap_or(self.tick);
         Status {
             state: self.state(),
@@ -276,10 +254,7 @@ impl<'a> Player<'a> {
         if self.fault.is_some() {
             State::Fault
         } else if let Some(excursion) = &self.excursion {
-            match excursion {
-                Excursion::Landing(_) => State::Stopping,
-                Excursion::Approach(_) => State::Moving,
-            }
+            if excursion.stops { State::Stopping } else { State::Moving }
         } else if self.playing.is_some() {
             State::Running
         } else if self.armed.is_some() {
@@ -297,11 +272,12 @@ impl<'a> Player<'a> {
 
     /// Leaves the path for the shortest way to rest; tables are forgotten. At rest there is nothing to do.
     fn land(&mut self) {
-        let lands = matches!(self.excursion, Some(Excursion::Landing(_)));
+        let lands = self.excursion.as_ref().is_some_and(|way| way.stops);
         if !lands && !self.last.done {
             let AxisConfig { limits, tick_ns, .. } = self.config;
             // Without one, as when the set-point is no number, standing still at once is all that is left.
-            self.excursion = Landing::new(&self.last, &limits, tick_ns).ok().map(Excursion::Landing);
+            let course = Course::to_velocity(&self.last, 0.0, &limits, tick_ns).ok();
+            self.excursion = course.map(|course| Excursion { course, stops: true });
         }
         (self.playing, self.armed) = (None, None);
         self.clear_unused();
@@ -321,8 +297,8 @@ impl<'a> Player<'a> {
             return Err(Reject::Target);
         }
         limits.velocity = slower.min(limits.velocity);
-        let approach = Approach::new(&self.last, position, &limits, tick_ns).map_err(|_| Reject::Target)?;
-        self.excursion = Some(Excursion::Approach(approach));
+        let course = Course::to(&self.last, position, &limits, tick_ns).map_err(|_| Reject::Target)?;
+        self.excursion = Some(Excursion { course, stops: false });
         self.clear_unused();
         Ok(())
     }
@@ -330,7 +306,7 @@ impl<'a> Player<'a> {
     /// The next set-point of a motion without a table.
     fn stray(&mut self) -> Setpoint {
         let Some(excursion) = &mut self.excursion else { return Setpoint::at_rest(self.last.position) };
-        let setpoint = excursion.next();
+        let setpoint = excursion.course.next();
         if setpoint.done {
             self.excursion = None;
             self.has_played = true;
@@ -489,7 +465,7 @@ impl<'a> Player<'a> {
     /// Where the axis will stand when all that it must still play has been played [counts].
     fn next_position(&self) -> i64 {
         let armed = self.armed.and_then(|armed| Some(self.slot(armed.side).checked()?.axis().end));
-        let strayed = self.excursion.as_ref().map(Excursion::end);
+        let strayed = self.excursion.as_ref().and_then(|way| way.course.end());
         strayed.or(armed).or(self.playing.map(|p| p.position)).unwrap_or(self.last.position)
     }
 

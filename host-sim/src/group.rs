@@ -123,13 +123,8 @@ fn together(axes: &[Axis], alone: Vec<AxisMotion>) -> Result<GroupMotion, GroupE
     times.push(least);
     times.extend(timed.iter().flatten().flat_map(|t| t.edges()).filter(|&t| t > least));
     times.sort_by(f64::total_cmp);
-    // An axis that already takes this long needs no other motion.
-    let takes = |axis: usize, time: f64| (time - alone[axis].duration).abs() <= ROUNDING * time;
     let able = |time: f64| {
-        timed
-            .iter()
-            .enumerate()
-            .all(|(axis, t)| takes(axis, time) || t.as_ref().is_none_or(|t| t.admits(time)))
+        timed.iter().zip(&alone).all(|(t, own)| own.takes(time) || t.as_ref().is_none_or(|t| t.admits(time)))
     };
     // The displacements within reach grow without bound in the end, so that the last edge is an end of waiting too.
     let duration = times.iter().copied().find(|&time| able(time));
@@ -145,7 +140,7 @@ fn together(axes: &[Axis], alone: Vec<AxisMotion>) -> Result<GroupMotion, GroupE
             motions.push(own);
             continue;
         };
-        if (duration - own.duration).abs() <= ROUNDING * duration {
+        if own.takes(duration) {
             motions.push(own);
             continue;
         }
@@ -214,6 +209,13 @@ fn on_a_line(axes: &[Axis]) -> Option<GroupMotion> {
         AxisMotion { segments: segments.collect(), end: *to, duration: led.duration }
     });
     Some(GroupMotion { axes: motions.collect(), duration: led.duration, sync: Sync::Phase })
+}
+
+impl AxisMotion {
+    /// An axis that already takes this long needs no other motion.
+    fn takes(&self, time: f64) -> bool {
+        (time - self.duration).abs() <= ROUNDING * time
+    }
 }
 
 impl<const N: usize> From<&Profile<f64, N>> for AxisMotion {

@@ -188,11 +188,7 @@ impl<'a> Programme<'a> {
     fn add_section(&mut self, section: &'a PlannedSection) -> Result<(), SimError> {
         let number = self.orders.len() as u32;
         let refuse = |source| SimError::Pack { table: number, source };
-        let scale = |(axis, limits): (&Axis, &AxisLimits)| AxisScale {
-            counts_per_unit: axis.counts_per_unit,
-            limits: *limits,
-        };
-        let scales: Vec<_> = self.machine.axes.iter().zip(&section.limits).map(scale).collect();
+        let scales = AxisScale::all(&self.machine.axes, &section.limits);
         let packed = pack(&section.table, number, self.tick_ns, &scales).map_err(refuse)?;
         self.free_jerk |= section.limits.iter().any(|l| l.jerk == f64::INFINITY);
         self.end = programmed_end(&section.table, self.machine);

@@ -11,7 +11,7 @@ use std::time::Duration;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use firmware_core::evaluate::Cursor;
 use firmware_core::table::{CheckedTable, TableView};
-use planner::feed::pack::{AxisScale, Packed, pack};
+use planner::feed::pack::Packed;
 use planner::job::gcode::Options;
 use planner::job::machine::{LimitSet, Machine};
 use tests::chain;
@@ -29,13 +29,7 @@ fn longest() -> Packed {
     let job = chain::plan(PROGRAM.as_bytes(), &machine, &Options::default(), LimitSet::default());
     let job = job.expect("the sample program has a plan");
     let section = job.plan.sections().max_by_key(|s| s.table.steps.len()).expect("it moves");
-    let scales: Vec<AxisScale> = machine
-        .axes
-        .iter()
-        .zip(&section.limits)
-        .map(|(axis, &limits)| AxisScale { counts_per_unit: axis.counts_per_unit, limits })
-        .collect();
-    pack(&section.table, 1, TICK_NS, &scales).expect("what is planned can be packed")
+    chain::packed(section, 1, TICK_NS, &machine).expect("what is planned can be packed")
 }
 
 fn view(packed: &Packed) -> TableView<'_> {

@@ -6,7 +6,6 @@
 
 use std::{env, fs};
 
-use planner::feed::pack::{AxisScale, pack};
 use planner::job::gcode::Options;
 use planner::job::machine::{LimitSet, Machine};
 use serde::Serialize;
@@ -41,14 +40,8 @@ fn main() {
         .expect("the sample program has a plan");
     let mut tables = Vec::new();
     for (number, section) in job.plan.sections().enumerate() {
-        let scales: Vec<AxisScale> = machine
-            .axes
-            .iter()
-            .zip(&section.limits)
-            .map(|(axis, &limits)| AxisScale { counts_per_unit: axis.counts_per_unit, limits })
-            .collect();
         let packed =
-            pack(&section.table, number as u32, TICK_NS, &scales).expect("what is planned can be packed");
+            chain::packed(section, number, TICK_NS, &machine).expect("what is planned can be packed");
         for axis in &packed.axes {
             header(&mut tables, &packed.header);
             header(&mut tables, &axis.header);

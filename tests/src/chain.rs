@@ -4,12 +4,27 @@ use host_sim::report::SimReport;
 use host_sim::scenario::{SimError, SimSettings, simulate};
 use host_sim::trace::PlotTrace;
 use planner::analysis::comparison::Comparison;
+use planner::feed::job::PlannedSection;
+use planner::feed::pack::{AxisScale, PackError, Packed, pack};
 use planner::geometry::sections::{PathSettings, SectionError, sections};
 use planner::job::gcode::{Counters, Options, Program, ProgramError};
 use planner::job::machine::{LimitSet, Machine};
 use planner::job::program::{Item, Move};
 use planner::pipeline::{self, JobError, JobPlan};
 use planner::topp::problem::Settings;
+
+/// A section's table for the drives of `machine`, for a control tick of `tick_ns`.
+///
+/// # Errors
+/// What the format cannot express.
+pub fn packed(
+    section: &PlannedSection,
+    number: usize,
+    tick_ns: u32,
+    machine: &Machine,
+) -> Result<Packed, PackError> {
+    pack(&section.table, number as u32, tick_ns, &AxisScale::all(&machine.axes, &section.limits))
+}
 
 /// Why a program has no plan.
 pub type ChainError = JobError<SectionError<ProgramError>>;

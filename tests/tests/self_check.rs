@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use firmware_core::evaluate::Cursor;
 use firmware_core::proof::MARGIN;
 use firmware_core::table::{CheckedTable, TableView};
-use planner::feed::pack::{AxisScale, Packed, pack};
+use planner::feed::pack::Packed;
 use planner::job::gcode::Options;
 use planner::job::machine::{LimitSet, Machine};
 use protocol::table::{AxisHeader, AxisLimit, Limits, TableError, TableHeader};
@@ -83,13 +83,7 @@ fn what_the_planner_packs_is_proven() {
         for set in [LimitSet::default(), LimitSet::VelocityAcceleration] {
             let job = chain::plan(program.as_bytes(), &machine, &Options::default(), set).unwrap();
             for (number, section) in job.plan.sections().enumerate() {
-                let scales: Vec<AxisScale> = machine
-                    .axes
-                    .iter()
-                    .zip(&section.limits)
-                    .map(|(axis, &limits)| AxisScale { counts_per_unit: axis.counts_per_unit, limits })
-                    .collect();
-                let packed = pack(&section.table, number as u32, TICK_NS, &scales).unwrap();
+                let packed = chain::packed(section, number, TICK_NS, &machine).unwrap();
                 for axis in 0..packed.axes.len() {
                     let parts = Parts::of(&packed, axis);
                     let proof = parts.view().unwrap().prove(None);

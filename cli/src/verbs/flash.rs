@@ -1,7 +1,7 @@
 //! `feedspline flash`: build a drive's image, put it where it runs, and ask it who it is.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 use host_sim::emulator::{Emulator, PROGRAM};
@@ -77,17 +77,13 @@ fn existing(image: &Path) -> Result<PathBuf, Failure> {
 /// Builds the image of a board from its sources.
 fn build(board: Board, node: Node) -> Result<PathBuf, Failure> {
     let folder = sources(&args::name(board))?;
-    let output = Command::new("cargo")
+    let mut command = Command::new("cargo");
+    command
         .args(["build", "--release", "--locked", "--bin", "drive"])
         .env("FEEDSPLINE_NODE", node.number().to_string())
         .env_remove("CARGO_TARGET_DIR")
-        .current_dir(&folder)
-        .stdin(Stdio::null())
-        .output()
-        .map_err(|e| {
-            Failure::input(format!("cargo does not start: {e}"))
-                .with_help("Install Rust (https://rustup.rs), or name a finished image with --image.")
-        })?;
+        .current_dir(&folder);
+    let output = run(command, "Install Rust (https://rustup.rs), or name a finished image with --image.")?;
     if !output.status.success() {
         let said = String::from_utf8_lossy(&output.stderr);
         let error = said.lines().find(|line| line.starts_with("error")).unwrap_or("cargo says nothing of it");
@@ -96,6 +92,14 @@ fn build(board: Board, node: Node) -> Result<PathBuf, Failure> {
         ));
     }
     Ok(folder.join("target").join(TARGET).join("release").join("drive"))
+}
+
+/// Runs a program to its end; `help` is for one that does not start.
+fn run(mut command: Command, help: &str) -> Result<Output, Failure> {
+    command.stdin(Stdio::null()).output().map_err(|e| {
+        let program = command.get_program().display();
+        Failure::input(format!("{program} does not start: {e}")).with_help(help)
+    })
 }
 
 /// The folder of a board's sources: `firmware/` and its name, here or in a folder above.
@@ -131,15 +135,9 @@ fn emulated(image: &Path, node: Node) -> Result<Identity, Failure> {
 /// Writes an image to the chip behind the debug probe, and starts it.
 fn write(image: &Path) -> Result<(), Failure> {
     for (word, file) in [("download", Some(image)), ("reset", None)] {
-        let output = Command::new(PROBE)
-            .args([word, "--chip", CHIP])
-            .args(file)
-            .stdin(Stdio::null())
-            .output()
-            .map_err(|e| {
-                Failure::input(format!("{PROBE} does not start: {e}"))
-                    .with_help("Install it from https://probe.rs, and connect the board's debug probe.")
-            })?;
+        let mut command = Command::new(PROBE);
+        command.args([word, "--chip", CHIP]).args(file);
+        let output = run(command, "Install it from https://probe.rs, and connect the board's debug probe.")?;
         if !output.status.success() {
             let said = String::from_utf8_lossy(&output.stderr);
             let last =

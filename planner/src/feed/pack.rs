@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use super::table::{FeedTable, MIN_SPANS, SpanLaw};
 use crate::geometry::grid_path::{GridAxis, GridPath};
-use crate::job::machine::AxisLimits;
+use crate::job::machine::{Axis, AxisLimits};
 use crate::tolerances::{FORMAT_MARGIN, LSB_RATIO};
 
 /// What packing needs to know of one axis besides its control points.
@@ -20,6 +20,17 @@ pub struct AxisScale {
     pub counts_per_unit: f64,
     /// What the table was planned for [axis units].
     pub limits: AxisLimits,
+}
+
+impl AxisScale {
+    /// One per axis of a machine, for a table that was planned for `limits`.
+    pub fn all(axes: &[Axis], limits: &[AxisLimits]) -> Vec<Self> {
+        let scale = |(axis, limits): (&Axis, &AxisLimits)| Self {
+            counts_per_unit: axis.counts_per_unit,
+            limits: *limits,
+        };
+        axes.iter().zip(limits).map(scale).collect()
+    }
 }
 
 /// A table as it is stored and sent.

@@ -10,13 +10,13 @@ fn limits(v: f32, a: f32, j: f32) -> Limits {
 
 /// Plays a move; every set-point follows from the one before. Returns the number of ticks.
 fn play(from: Setpoint, target: i64, l: &Limits) -> u64 {
-    let mut approach = Approach::new(&from, target, l, TICK_NS).unwrap();
-    let left = approach.left();
+    let mut course = Course::to(&from, target, l, TICK_NS).unwrap();
+    let left = course.left().unwrap();
     let (tick, jerk) = (1e-3f64, f64::from(l.jerk.unwrap()));
     let (v, a) = (f64::from(l.velocity), f64::from(l.acceleration));
     let mut last = from;
     for n in 1..=left + 1 {
-        let now = approach.next();
+        let now = course.next();
         let [v0, v1] = [last.velocity, now.velocity].map(f64::from);
         let [a0, a1] = [last.acceleration, now.acceleration].map(f64::from);
         assert!(v1.abs() <= v * 1.0001 && a1.abs() <= a * 1.0001, "{last:?} {now:?}");
@@ -79,6 +79,65 @@ fn random_moves_from_any_motion_end_on_the_count() {
 fn what_is_no_number_is_refused() {
     let l = limits(1e5, 1e6, 1e8);
     let from = Setpoint { position: 0, velocity: f32::NAN, acceleration: 0.0, done: false };
-    assert!(Approach::new(&from, 10, &l, TICK_NS).is_err());
-    assert!(Approach::new(&Setpoint::at_rest(0), 10, &limits(0.0, 1.0, 1.0), TICK_NS).is_err());
+    assert!(Course::to(&from, 10, &l, TICK_NS).is_err());
+    assert!(Course::to(&Setpoint::at_rest(0), 10, &limits(0.0, 1.0, 1.0), TICK_NS).is_err());
+    assert!(Course::to_velocity(&from, 0.0, &l, TICK_NS).is_err());
+    assert!(Course::to_velocity(&moving(0.0, f32::INFINITY), 0.0, &l, TICK_NS).is_err());
+    assert!(Course::to_velocity(&moving(0.0, 0.0), 2e5, &l, TICK_NS).is_err());
+}
+
+const LIMITS: Limits = Limits { velocity: 1e5, acceleration: 1e6, jerk: Some(1e8) };
+
+fn moving(velocity: f32, acceleration: f32) -> Setpoint {
+    Setpoint { position: 1 << 40, velocity, acceleration, done: false }
+}
+
+#[test]
+fn the_way_to_rest_takes_as_long_as_the_textbook_says_and_ends_on_a_count() {
+    // v/a + a/j = 110 ms, v (v/a + a/j)/2 = 5500 counts.
+    let mut course = Course::to_velocity(&moving(1e5, 0.0), 0.0, &LIMITS, TICK_NS).unwrap();
+    let left = course.left().unwrap();
+    assert!((110..=111).contains(&left), "{left}");
+    assert_eq!(course.end(), Some((1 << 40) + 5500));
+    let mut last = moving(1e5, 0.0);
+    for _ in 1..left {
+        let next = course.next();
+        assert!(!next.done && next.position >= last.position && next.velocity <= last.velocity);
+        last = next;
+    }
+    assert_eq!(course.next(), Setpoint::at_rest((1 << 40) + 5500));
+}
+
+#[test]
+fn without_a_limit_of_jerk_it_is_soft_all_the_same() {
+    let limits = Limits { jerk: None, ..LIMITS };
+    let mut course = Course::to_velocity(&moving(-1e5, 0.0), 0.0, &limits, TICK_NS).unwrap();
+    let first = course.next();
+    assert!((first.acceleration - 0.25e6).abs() < 1.0, "{first:?}");
+}
+
+#[test]
+fn a_velocity_is_kept_for_as_long_as_it_takes() {
+    for velocity in [3.7f32, -0.001, 9.9e4, -1e5] {
+        let mut course = Course::to_velocity(&moving(0.0, 0.0), velocity, &LIMITS, TICK_NS).unwrap();
+        assert_eq!((course.end(), course.left()), (None, None));
+        let mut last = moving(0.0, 0.0);
+        let mut kept: Option<(u32, i64)> = None;
+        for tick in 0..1_000_000u32 {
+            let now = course.next();
+            let moved = (now.position - last.position) as f64;
+            let middle = 0.5e-3 * f64::from(last.velocity + now.velocity);
+            assert!((moved - middle).abs() <= 1.5, "{tick}: {last:?} {now:?}");
+            assert!(!now.done);
+            last = now;
+            if now.velocity == velocity && now.acceleration == 0.0 {
+                let (from, position) = *kept.get_or_insert((tick, now.position));
+                let ideal = f64::from(tick - from) * 1e-3 * f64::from(velocity);
+                let off = (now.position - position) as f64 - ideal;
+                // f32 holds the way of a tick to a part in 2^24.
+                assert!(off.abs() <= 1.0 + ideal.abs() / f64::from(1 << 23), "{tick}: {off}");
+            }
+        }
+        assert!(kept.is_some_and(|(from, _)| from < 200), "{velocity}");
+    }
 }
