@@ -1,10 +1,13 @@
-//! A drive on the bus: the player behind CAN frames.
+//! A drive on the bus: its halves behind CAN frames.
 
 use protocol::bus::{BLOCK_BYTES, Frame, FrameSize, Node, Reassembler, Segments, ids};
-use protocol::message::{HostMessage, Status, decode, encode};
+use protocol::message::{DriveMessage, HostMessage, Status, decode, encode};
 
+use crate::axis::AxisConfig;
 use crate::evaluate::Setpoint;
-use crate::player::{AxisConfig, Player};
+use crate::intake::{Intake, Orders};
+use crate::orders::Report;
+use crate::player::Player;
 
 /// Longest answer [bytes].
 const ANSWER_BYTES: usize = 64;
@@ -20,12 +23,11 @@ pub struct DriveConfig {
     pub axis: AxisConfig,
 }
 
-/// One drive.
+/// Messages out of frames, and answers into frames.
 #[derive(Debug)]
-pub struct Drive<'a> {
+struct Mail {
     node: Node,
     frames: FrameSize,
-    player: Player<'a>,
     to_all: Reassembler<BLOCK_BYTES>,
     to_this: Reassembler<BLOCK_BYTES>,
     stop: Reassembler<8>,
@@ -37,13 +39,11 @@ pub struct Drive<'a> {
     sent: usize,
 }
 
-impl<'a> Drive<'a> {
-    /// A drive at rest, with two buffers for tables.
-    pub fn new(config: DriveConfig, a: &'a mut [u8], b: &'a mut [u8]) -> Self {
+impl Mail {
+    fn new(config: &DriveConfig) -> Self {
         Self {
             node: config.node,
             frames: config.frames,
-            player: Player::new(config.axis, a, b),
             to_all: Reassembler::new(),
             to_this: Reassembler::new(),
             stop: Reassembler::new(),
@@ -54,9 +54,9 @@ impl<'a> Drive<'a> {
         }
     }
 
-    /// Takes a frame from the bus; frames of others are ignored.
+    /// The message that a frame completes, if any; frames of others are ignored.
     #[inline(never)]
-    pub fn receive(&mut self, frame: &Frame) {
+    fn receive(&mut self, frame: &Frame) -> Option<HostMessage<'_>> {
         let message = if frame.id() == ids::STOP {
             self.stop.push(frame.data())
         } else if frame.id() == ids::BROADCAST {
@@ -64,12 +64,89 @@ impl<'a> Drive<'a> {
         } else if frame.id() == self.node.to_drive() {
             self.to_this.push(frame.data())
         } else {
-            return;
+            return None;
         };
         match message.map(|message| message.map(decode::<HostMessage<'_>>)) {
-            Ok(None) => {}
-            Ok(Some(Ok(message))) => self.player.handle(&message),
-            Ok(Some(Err(_))) | Err(_) => self.dropped = self.dropped.saturating_add(1),
+            Ok(None) => None,
+            Ok(Some(Ok(message))) => Some(message),
+            Ok(Some(Err(_))) | Err(_) => {
+                self.dropped = self.dropped.saturating_add(1);
+                None
+            }
+        }
+    }
+
+    /// The next frame to send; `answers` are fetched one by one.
+    #[inline(never)]
+    fn poll_transmit(&mut self, mut answers: impl FnMut() -> Option<DriveMessage>) -> Option<Frame> {
+        loop {
+            let message = self.answer.get(..self.answer_length).unwrap_or(&[]);
+            let mut frames = Segments::new(self.node.from_drive(), self.frames, message);
+            if self.answer_length > 0
+                && let Some(frame) = frames.as_mut().and_then(|frames| frames.nth(self.sent))
+            {
+                self.sent += 1;
+                return Some(frame);
+            }
+            let answer = answers()?;
+            self.sent = 0;
+            self.answer_length = encode(&answer, &mut self.answer).map_or(0, <[u8]>::len);
+        }
+    }
+}
+
+/// The talking half of a drive behind frames: for boards, where [`crate::motion::Motion`] runs in the control interrupt.
+#[derive(Debug)]
+pub struct Station<'a> {
+    mail: Mail,
+    intake: Intake<'a>,
+}
+
+impl<'a> Station<'a> {
+    /// With two buffers for tables.
+    pub fn new(config: DriveConfig, a: &'a mut [u8], b: &'a mut [u8]) -> Self {
+        Self { mail: Mail::new(&config), intake: Intake::new(config.axis, a, b) }
+    }
+
+    /// Takes a frame from the bus.
+    pub fn receive(&mut self, frame: &Frame, orders: &mut dyn Orders<'a>) {
+        if let Some(message) = self.mail.receive(frame) {
+            self.intake.handle(&message, orders);
+        }
+    }
+
+    /// Takes what the motion has said; what could not be ordered before is ordered now.
+    pub fn hear(&mut self, report: Option<Report<'a>>, orders: &mut dyn Orders<'a>) {
+        if let Some(report) = report {
+            self.intake.hear(report);
+        }
+        self.intake.retry(orders);
+    }
+
+    /// The next frame to send.
+    pub fn poll_transmit(&mut self) -> Option<Frame> {
+        let intake = &mut self.intake;
+        self.mail.poll_transmit(|| intake.poll_answer())
+    }
+}
+
+/// One drive in one piece: for hosts, where nothing interrupts anything.
+#[derive(Debug)]
+pub struct Drive<'a> {
+    mail: Mail,
+    player: Player<'a>,
+}
+
+impl<'a> Drive<'a> {
+    /// A drive at rest and without torque, with two buffers for tables.
+    pub fn new(config: DriveConfig, a: &'a mut [u8], b: &'a mut [u8]) -> Self {
+        Self { mail: Mail::new(&config), player: Player::new(config.axis, a, b) }
+    }
+
+    /// Takes a frame from the bus; frames of others are ignored.
+    pub fn receive(&mut self, frame: &Frame) {
+        if let Some(message) = self.mail.receive(frame) {
+            self.player.handle(&message);
         }
     }
 
@@ -83,27 +160,10 @@ impl<'a> Drive<'a> {
         self.player.observe(actual);
     }
 
-    /// Tells what a tick has cost, in whatever the board counts.
-    pub fn observe_cost(&mut self, count: u32) {
-        self.player.observe_cost(count);
-    }
-
     /// The next frame to send.
-    #[inline(never)]
     pub fn poll_transmit(&mut self) -> Option<Frame> {
-        loop {
-            let message = self.answer.get(..self.answer_length).unwrap_or(&[]);
-            let mut frames = Segments::new(self.node.from_drive(), self.frames, message);
-            if self.answer_length > 0
-                && let Some(frame) = frames.as_mut().and_then(|frames| frames.nth(self.sent))
-            {
-                self.sent += 1;
-                return Some(frame);
-            }
-            let answer = self.player.poll_answer()?;
-            self.sent = 0;
-            self.answer_length = encode(&answer, &mut self.answer).map_or(0, <[u8]>::len);
-        }
+        let player = &mut self.player;
+        self.mail.poll_transmit(|| player.poll_answer())
     }
 
     /// How the drive is.
@@ -113,6 +173,6 @@ impl<'a> Drive<'a> {
 
     /// How many frames and messages could not be understood.
     pub fn dropped(&self) -> u32 {
-        self.dropped
+        self.mail.dropped
     }
 }

@@ -4,17 +4,26 @@
 //! root only, so the same source gives the same bits on every machine.
 //!
 //! [`table`] is the one door: bytes become a [`table::CheckedTable`] or a named error. [`evaluate`] plays a
-//! checked table at any path time. [`double_s`] plans motion where there is no table. [`player`] is the axis' state machine on the level of messages;
-//! [`drive`] puts it behind CAN frames.
+//! checked table at any path time. [`double_s`] plans motion where there is no table.
+//!
+//! A drive has two halves. [`intake`] talks: messages in, tables checked, answers out. [`motion`] moves: one set-point per
+//! control tick. They share no memory and hand each other [`orders`], so that the tick never waits. [`player`] is both on the
+//! level of messages; [`drive`] puts them behind CAN frames.
 #![no_std]
 
+pub mod axis;
 mod course;
 pub mod double_s;
 pub mod drive;
 pub mod evaluate;
+mod guard;
+pub mod intake;
 mod math;
+pub mod motion;
+pub mod orders;
 pub mod player;
 pub mod proof;
+mod rate;
 mod store;
 pub mod table;
 mod telemetry;

@@ -3,12 +3,10 @@
 //! On a span position is a cubic in x and the squared speed a quadratic, so velocity squared, acceleration and jerk over
 //! the speed are polynomials in x, and the largest of their Bernstein coefficients bounds them. Jerk is bounded through a
 //! tangent: J/sqrt(q) >= J (1.5 s - s^3 q/2) for any s. Where a span as a whole does not do, its halves, quarters and
-//! eighths are looked at. Rounding is outward. The share [`MARGIN`] is granted beyond every limit.
+//! eighths are looked at. Rounding is outward. The margin that the table's header declares is granted beyond every limit.
 
 use protocol::table::{AxisLimit, Limits};
 
-/// What a table may exceed a limit by, as a share of it: rounding of the table, and of this proof.
-pub const MARGIN: f32 = 0.005;
 /// Rounding errors of a coefficient, as a share of the sizes that it is made from.
 const ROUNDING: f32 = 32.0 * f32::EPSILON;
 /// Parts in which a span is looked at, the fewest first.
@@ -71,8 +69,9 @@ pub(crate) struct Granted {
 }
 
 impl Granted {
-    pub(crate) fn new(limits: &Limits) -> Self {
-        let with = |limit: f32| limit * (1.0 + MARGIN);
+    /// `margin` is what may be granted for rounding, of the table and of this proof [0.1 %].
+    pub(crate) fn new(limits: &Limits, margin: u8) -> Self {
+        let with = |limit: f32| limit * (1.0 + f32::from(margin) * 1e-3);
         Self {
             velocity: with(limits.velocity),
             acceleration: with(limits.acceleration),

@@ -5,10 +5,11 @@ use protocol::table::{AxisHeader, TableHeader};
 
 use crate::table::{CheckedTable, TableView};
 
-/// A buffer and what is known of the table in it.
+/// A buffer and what is known of the table in it; without its memory while the motion has it.
 #[derive(Debug)]
 pub(crate) struct Slot<'a> {
-    memory: &'a mut [u8],
+    memory: Option<&'a mut [u8]>,
+    room: usize,
     table: Option<Table>,
 }
 
@@ -31,28 +32,97 @@ struct Progress {
     seal: Option<u32>,
 }
 
+/// A checked table with its memory: what communication and motion hand to each other.
+#[derive(Debug)]
+pub struct Loaded<'a> {
+    memory: &'a mut [u8],
+    header: TableHeader,
+    axis: AxisHeader,
+    duration: u64,
+}
+
+impl<'a> Loaded<'a> {
+    /// The table's number.
+    pub(crate) fn number(&self) -> u32 {
+        self.header.table
+    }
+
+    /// Its shared header.
+    pub(crate) fn header(&self) -> &TableHeader {
+        &self.header
+    }
+
+    /// Its axis header.
+    pub(crate) fn axis(&self) -> &AxisHeader {
+        &self.axis
+    }
+
+    /// How long it plays [2^-32 s].
+    pub(crate) fn duration(&self) -> u64 {
+        self.duration
+    }
+
+    /// The table; there always is one.
+    pub(crate) fn table(&self) -> Option<CheckedTable<'_>> {
+        let (shared, rest) = self.memory.split_at_checked(self.header.shared_bytes() as usize)?;
+        let controls = rest.get(..self.axis.control_bytes as usize)?;
+        let view = TableView::parts(&self.header, &self.axis, shared, controls)?;
+        Some(CheckedTable::known(view, self.duration))
+    }
+
+    /// Its memory, for the next one.
+    pub(crate) fn into_memory(self) -> &'a mut [u8] {
+        self.memory
+    }
+}
+
 impl<'a> Slot<'a> {
     pub(crate) fn new(memory: &'a mut [u8]) -> Self {
-        Self { memory, table: None }
+        Self { room: memory.len(), memory: Some(memory), table: None }
     }
 
     /// Bytes there are for a table.
     pub(crate) fn room(&self) -> usize {
-        self.memory.len()
+        self.room
     }
 
-    /// Number of the table in it.
+    /// Number of the table in it, or of the one that the motion has.
     pub(crate) fn number(&self) -> Option<u32> {
         self.table.map(|t| t.header.table)
     }
 
     /// The table was checked and may be played.
     pub(crate) fn is_ready(&self) -> bool {
-        self.table.is_some_and(|t| t.checked.is_some())
+        self.memory.is_some() && self.table.is_some_and(|t| t.checked.is_some())
     }
 
+    /// The motion has the table.
+    pub(crate) fn is_away(&self) -> bool {
+        self.memory.is_none()
+    }
+
+    /// Forgets a table that the motion does not have.
     pub(crate) fn clear(&mut self) {
-        self.table = None;
+        if self.memory.is_some() {
+            self.table = None;
+        }
+    }
+
+    /// Gives a checked table away; the slot keeps its number.
+    pub(crate) fn give(&mut self) -> Option<Loaded<'a>> {
+        let Table { header, axis: Some(axis), checked: Some(duration), .. } = self.table? else {
+            return None;
+        };
+        let memory = self.memory.take()?;
+        Some(Loaded { memory, header, axis, duration })
+    }
+
+    /// Takes its memory back; the table is still there if it is to be `kept`.
+    pub(crate) fn take_back(&mut self, loaded: Loaded<'a>, kept: bool) {
+        self.memory = Some(loaded.into_memory());
+        if !kept {
+            self.table = None;
+        }
     }
 
     pub(crate) fn open(&mut self, header: TableHeader) -> Result<(), Reject> {
@@ -72,7 +142,7 @@ impl<'a> Slot<'a> {
     }
 
     fn fits(&self, needed: u64) -> Result<(), Reject> {
-        let available = self.memory.len() as u64;
+        let available = self.memory.as_ref().map_or(0, |memory| memory.len()) as u64;
         if needed > available { Err(Reject::NoRoom { needed, available }) } else { Ok(()) }
     }
 
@@ -89,7 +159,8 @@ impl<'a> Slot<'a> {
         if after > length {
             return Err(Reject::Incomplete { part, received: offset });
         }
-        let target = self.memory.get_mut(from + offset as usize..from + after);
+        let memory = self.memory.as_mut().ok_or(Reject::NotOpen)?;
+        let target = memory.get_mut(from + offset as usize..from + after);
         target.ok_or(Reject::NotOpen)?.copy_from_slice(bytes);
         progress.received = after as u32;
         Ok(())
@@ -106,7 +177,8 @@ impl<'a> Slot<'a> {
         if (progress.received as usize) < length {
             return Err(Reject::Incomplete { part, received: progress.received });
         }
-        let bytes = self.memory.get(from..from + length).ok_or(Reject::NotOpen)?;
+        let memory = self.memory.as_ref().ok_or(Reject::NotOpen)?;
+        let bytes = memory.get(from..from + length).ok_or(Reject::NotOpen)?;
         let found = match (part, table.axis) {
             (Part::Shared, _) => part_crc(&table.header, &[bytes]),
             (Part::Axis, Some(axis)) => part_crc(&axis, &[bytes]),
@@ -120,19 +192,13 @@ impl<'a> Slot<'a> {
         Ok(table.is_complete())
     }
 
-    /// Checks a complete table, and proves that it keeps its limits and stays within `travel`.
-    pub(crate) fn check(&mut self, travel: Option<[i64; 2]>) -> Result<CheckedTable<'_>, Reject> {
+    /// Checks a complete table, and proves that it keeps its limits and stays within `travel`; its duration [2^-32 s].
+    pub(crate) fn check(&mut self, travel: Option<[i64; 2]>) -> Result<u64, Reject> {
         let duration = self.view().ok_or(Reject::NotOpen)?.prove(travel).map_err(Reject::Table)?.duration();
         if let Some(table) = &mut self.table {
             table.checked = Some(duration);
         }
-        self.checked().ok_or(Reject::NotReady)
-    }
-
-    /// The table, if it was checked.
-    pub(crate) fn checked(&self) -> Option<CheckedTable<'_>> {
-        let duration = self.table?.checked?;
-        Some(CheckedTable::known(self.view()?, duration))
+        Ok(duration)
     }
 
     /// Both headers of a table that is coming in.
@@ -148,12 +214,12 @@ impl<'a> Slot<'a> {
     }
 
     fn view(&self) -> Option<TableView<'_>> {
-        let table = self.table?;
-        let shared = table.header.shared_bytes() as usize;
-        let axis = table.axis?;
-        let (shared, rest) = self.memory.split_at_checked(shared)?;
+        let table = self.table.as_ref()?;
+        let axis = table.axis.as_ref()?;
+        let (shared, rest) =
+            self.memory.as_ref()?.split_at_checked(table.header.shared_bytes() as usize)?;
         let controls = rest.get(..axis.control_bytes as usize)?;
-        TableView::new(table.header, axis, shared, controls).ok()
+        TableView::new(&table.header, axis, shared, controls).ok()
     }
 }
 
@@ -180,7 +246,7 @@ impl Table {
 }
 
 #[cfg(test)]
-impl Slot<'_> {
+impl Loaded<'_> {
     /// Overwrites the table's bytes, as a memory error would.
     pub(crate) fn corrupt(&mut self) {
         self.memory.fill(0xff);

@@ -13,8 +13,8 @@ const SLACK: i64 = 1;
 /// A table as it lies in memory: headers, and the streams they describe.
 #[derive(Clone, Copy, Debug)]
 pub struct TableView<'a> {
-    pub(crate) header: TableHeader,
-    pub(crate) axis: AxisHeader,
+    pub(crate) header: &'a TableHeader,
+    pub(crate) axis: &'a AxisHeader,
     pub(crate) geometry: &'a [u8],
     pub(crate) spans: &'a [u8],
     pub(crate) controls: &'a [u8],
@@ -33,8 +33,8 @@ impl<'a> TableView<'a> {
     /// # Errors
     /// A header field is not admissible, or a length differs from what its header says.
     pub fn new(
-        header: TableHeader,
-        axis: AxisHeader,
+        header: &'a TableHeader,
+        axis: &'a AxisHeader,
         shared: &'a [u8],
         controls: &'a [u8],
     ) -> Result<Self, TableError> {
@@ -43,14 +43,23 @@ impl<'a> TableView<'a> {
         if axis.table != header.table {
             return Err(TableError::Header(HeaderField::Table));
         }
-        let length = TableError::Header(HeaderField::Length);
-        let (geometry, spans) = shared.split_at_checked(header.geometry_bytes as usize).ok_or(length)?;
+        Self::parts(header, axis, shared, controls).ok_or(TableError::Header(HeaderField::Length))
+    }
+
+    /// The same, from headers that were checked.
+    pub(crate) fn parts(
+        header: &'a TableHeader,
+        axis: &'a AxisHeader,
+        shared: &'a [u8],
+        controls: &'a [u8],
+    ) -> Option<Self> {
+        let (geometry, spans) = shared.split_at_checked(header.geometry_bytes as usize)?;
         if spans.len() as u64 != u64::from(header.span_bytes)
             || controls.len() as u64 != u64::from(axis.control_bytes)
         {
-            return Err(length);
+            return None;
         }
-        Ok(Self { header, axis, geometry, spans, controls })
+        Some(Self { header, axis, geometry, spans, controls })
     }
 
     /// Goes through the whole table once, span by span, as the evaluator will.
@@ -71,7 +80,7 @@ impl<'a> TableView<'a> {
     /// # Errors
     /// The first rule that is broken, or the first span on which a limit cannot be proven ([`crate::proof`]).
     pub fn prove(self, travel: Option<[i64; 2]>) -> Result<CheckedTable<'a>, TableError> {
-        let granted = Granted::new(&self.axis.limits);
+        let granted = Granted::new(&self.axis.limits, self.header.margin);
         self.pass(|law, piece, offset| {
             let failed = |limit| TableError::Limit { limit, index: law.index() };
             let proven = match law.stretch(&self) {
@@ -146,12 +155,12 @@ impl<'a> CheckedTable<'a> {
 
     /// The shared header.
     pub fn header(&self) -> &TableHeader {
-        &self.view.header
+        self.view.header
     }
 
     /// The axis header.
     pub fn axis(&self) -> &AxisHeader {
-        &self.view.axis
+        self.view.axis
     }
 
     /// How long the table plays [2^-32 s].

@@ -35,6 +35,13 @@ impl PathClock {
         self.time = self.time.saturating_add(whole);
     }
 
+    /// One tick on at a mean rate [2^-30], rounded down; returns what is lost against rate 1, or won [2^-32 s].
+    pub(crate) fn advance_at(&mut self, mean: u64) -> i64 {
+        let step = self.step.saturating_mul(mean) >> 30;
+        self.time = self.time.saturating_add(step);
+        (self.step as i64).saturating_sub(step as i64)
+    }
+
     /// One tick on.
     pub fn advance(&mut self) {
         self.rest += self.step_rest;

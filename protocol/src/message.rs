@@ -5,10 +5,14 @@
 use serde::{Deserialize, Serialize};
 
 use crate::bus::MESSAGE_BYTES;
+use crate::power::{Power, PowerEvent};
 use crate::table::{AxisHeader, AxisLimit, Limits, TableError, TableHeader};
 
 /// Most table bytes of one [`HostMessage::Data`]; with all its other fields it then fits a block.
 pub const DATA_BYTES: usize = 312;
+
+/// Room for any header, as postcard.
+pub const HEADER_BYTES: usize = 96;
 
 /// From the host.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,6 +65,23 @@ pub enum HostMessage<'a> {
         /// No faster than this [counts/s]; none: as fast as the axis may be.
         velocity: Option<f32>,
     },
+    /// Goes at a velocity [counts/s] until told otherwise, as fast as the limits allow; 0 comes to rest. Where the axis
+    /// has a travel, it goes to the end of it.
+    MoveAt {
+        /// How fast, and which way.
+        velocity: f32,
+    },
+    /// Changes the power state.
+    Power(PowerEvent),
+    /// From this tick on, path time goes at another rate; 0 holds the axis on its path.
+    Override {
+        /// The rate [0.1 %].
+        permille: u16,
+        /// When [ticks].
+        tick: u64,
+    },
+    /// The host is there: what drives that guard against a lost connection wait for.
+    Alive,
 }
 
 /// A part of a table.
@@ -138,7 +159,9 @@ pub struct Identity {
 pub struct Status {
     /// What it does.
     pub state: State,
-    /// First cause of the fault, while in [`State::Fault`].
+    /// Its power state.
+    pub power: Power,
+    /// First cause of the latched fault.
     pub fault: Option<Fault>,
     /// The drive's tick count.
     pub tick: u64,
@@ -163,11 +186,11 @@ pub enum State {
     Running,
     /// Stands still at the end of a table.
     Holding,
-    /// A fault is latched, until the drive is built anew; it stands still, or comes to rest.
-    Fault,
+    /// Stands still on its path, which goes on when the override is raised.
+    Held,
     /// Comes to rest off the path.
     Stopping,
-    /// On its way to a position.
+    /// On its way to a position, or at a velocity.
     Moving,
 }
 
@@ -183,6 +206,13 @@ pub enum Fault {
     },
     /// A set-point would have broken a limit of the axis.
     Limit(AxisLimit),
+    /// The host was not heard for too long.
+    Connection,
+    /// The board has found something: over-current, over-temperature, an encoder that is gone.
+    Board {
+        /// Its number for it.
+        code: u16,
+    },
 }
 
 /// Why a drive refuses a message.
@@ -239,10 +269,16 @@ pub enum Reject {
         /// First possible tick.
         tick: u64,
     },
-    /// The drive is in fault.
+    /// A fault is latched.
     Fault,
-    /// The position is outside the travel, or the velocity is no positive number.
+    /// The position is outside the travel, or the velocity is no admissible number.
     Target,
+    /// Not in this power state.
+    Power(Power),
+    /// The axis has to come to rest first.
+    Moves,
+    /// The table does not admit this rate, or no change of it.
+    Override,
 }
 
 /// Why a message could not be written or read.
@@ -278,7 +314,7 @@ pub fn decode<'a, M: Deserialize<'a>>(bytes: &'a [u8]) -> Result<M, MessageError
 
 /// Checksum of a part: CRC-32C over its header, as postcard, and its streams in order.
 pub fn part_crc<H: Serialize>(header: &H, streams: &[&[u8]]) -> Result<u32, MessageError> {
-    let mut buffer = [0u8; 64];
+    let mut buffer = [0u8; HEADER_BYTES];
     let mut crc = crate::checksum::Crc32::new();
     crc.update(encode(header, &mut buffer)?);
     streams.iter().for_each(|bytes| crc.update(bytes));

@@ -5,24 +5,28 @@ use crate::checksum::Fnv64;
 /// All messages and streams in their order on the wire. Whoever changes one of them changes this text.
 pub const SCHEMA: &str = "\
 TableHeader{version u8,table u32,spans u32,geometry_spans u32,step_exponent i8,q_scale f32,tick_ns u32,\
-geometry_bytes u32,span_bytes u32}\
+geometry_bytes u32,span_bytes u32,margin u8,warp ?Warp}\
+Warp{rate u32,acceleration u32,jerk u32,slope u64,bend u64}\
 AxisHeader{table u32,axis u8,fraction_bits u8,start i64,end i64,limits Limits,control_bytes u32}\
 Limits{velocity f32,acceleration f32,jerk ?f32}\
 geometry{length<<1|more,spans-2}span{step,code dd u24}control{point dd i64}\
 Part[Shared,Axis]\
 HostMessage[Open TableHeader,OpenAxis AxisHeader,Data{table u32,part Part,offset u32,bytes [u8]},\
-Seal{table u32,part Part,crc u32},Start{table u32,tick u64},Stop,Identify,QuickStop,MoveTo{position i64,velocity ?f32}]\
+Seal{table u32,part Part,crc u32},Start{table u32,tick u64},Stop,Identify,QuickStop,MoveTo{position i64,velocity ?f32},\
+MoveAt{velocity f32},Power PowerEvent,Override{permille u16,tick u64},Alive]\
 DriveMessage[Ready{table u32,ticks u64,crc [u32;2]},Reject{table u32,reason Reject},Status,Identity,Telemetry]\
-Status{state State,fault ?Fault,tick u64,position i64,fill u64}\
+Status{state State,power Power,fault ?Fault,tick u64,position i64,fill u64}\
 Identity{version [u8;3],format u8,schema u64,axis u8,tick_ns u32,limits Limits,room u32}\
 Telemetry{ticks u32,following_max u32,following_rms f32,fill_ms u32,worst_tick u32}\
-State[Idle,Receiving,Ready,Armed,Running,Holding,Fault,Stopping,Moving]\
-Fault[Table{table u32,error TableError},Limit AxisLimit]\
+State[Idle,Receiving,Ready,Armed,Running,Holding,Held,Stopping,Moving]\
+Fault[Table{table u32,error TableError},Limit AxisLimit,Connection,Board{code u16}]\
+Power[SwitchOnDisabled,ReadyToSwitchOn,SwitchedOn,OperationEnabled,QuickStopActive,FaultReactionActive,Fault]\
+PowerEvent[Shutdown,SwitchOn,EnableOperation,DisableOperation,DisableVoltage,QuickStop,ResetFault,Fault,Stopped]\
 Reject[Table TableError,Checksum Part,Incomplete{part Part,received u32},NoRoom{needed u64,available u64},\
 Tick{tick_ns u32},Axis{axis u8},Limits,Position{position i64},Busy,NotOpen,NotReady,Late{tick u64},\
-Overlap{tick u64},Fault,Target]\
+Overlap{tick u64},Fault,Target,Power Power,Moves,Override]\
 Stream[Geometry,Spans,Controls]\
-HeaderField[Version,Table,Spans,GeometrySpans,StepExponent,QScale,Tick,Length,FractionBits,Limits]\
+HeaderField[Version,Table,Spans,GeometrySpans,StepExponent,QScale,Tick,Length,FractionBits,Limits,Margin,Warp]\
 TableError[Header HeaderField,Truncated{stream,index u32},Malformed{stream,index u32},\
 Range{stream,index u32},LeftOver{stream},Overfull{index u32},Count{stream},Bend{index u32},Slow{index u32},\
 Fast{index u32},ControlStep{index u32},Start,End,Limit{limit AxisLimit,index u32}]\

@@ -12,9 +12,11 @@ pub mod geometry;
 mod header;
 pub mod rules;
 pub mod span;
+pub mod warp;
 
 pub use error::{AxisLimit, HeaderField, Stream, TableError};
 pub use header::{AxisHeader, FORMAT_VERSION, Limits, TableHeader};
+pub use warp::Warp;
 
 #[cfg(test)]
 mod tests;

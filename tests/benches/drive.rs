@@ -34,7 +34,7 @@ fn longest() -> Packed {
 
 fn view(packed: &Packed) -> TableView<'_> {
     let part = &packed.axes[0];
-    TableView::new(packed.header, part.header, &packed.shared, &part.controls).expect("headers fit")
+    TableView::new(&packed.header, &part.header, &packed.shared, &part.controls).expect("headers fit")
 }
 
 /// Every set-point of the table, start to end, at a tick of 250 us.

@@ -77,7 +77,7 @@ fn start_of(packed: &Packed) -> i64 {
 /// Set-points of a table, straight from the evaluator.
 fn evaluated(packed: &Packed, axis: usize) -> Vec<Setpoint> {
     let part = &packed.axes[axis];
-    let view = TableView::new(packed.header, part.header, &packed.shared, &part.controls).unwrap();
+    let view = TableView::new(&packed.header, &part.header, &packed.shared, &part.controls).unwrap();
     let table = view.check().unwrap();
     let mut cursor = Cursor::new(&table).unwrap();
     let mut setpoints = Vec::new();
@@ -350,7 +350,7 @@ fn mutated_tables_are_refused_or_play_to_their_declared_end() {
             packed.header = header;
         }
         let part = &packed.axes[0];
-        let view = TableView::new(packed.header, part.header, &packed.shared, &part.controls);
+        let view = TableView::new(&packed.header, &part.header, &packed.shared, &part.controls);
         let Ok(table) = view.and_then(TableView::check) else {
             refused += 1;
             continue;

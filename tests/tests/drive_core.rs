@@ -12,7 +12,7 @@ const UNIT: f64 = 4_294_967_296.0;
 
 fn checked(packed: &Packed, axis: usize) -> CheckedTable<'_> {
     let part = &packed.axes[axis];
-    let view = TableView::new(packed.header, part.header, &packed.shared, &part.controls);
+    let view = TableView::new(&packed.header, &part.header, &packed.shared, &part.controls);
     view.and_then(TableView::check).expect("what the planner packs, a drive accepts")
 }
 

@@ -16,7 +16,7 @@ fn sample(random: &mut Random) -> (Packed, Limits) {
     let kind = if random.whole(0, 1) == 0 { FINE } else { COARSE };
     let mut packed = Sample::new(random, kind).packed(1).unwrap();
     let part = &packed.axes[0];
-    let view = TableView::new(packed.header, part.header, &packed.shared, &part.controls).unwrap();
+    let view = TableView::new(&packed.header, &part.header, &packed.shared, &part.controls).unwrap();
     let table = view.check().unwrap();
     let mut cursor = Cursor::new(&table).unwrap();
     let (mut time, mut most) = (0u64, [0.0f32; 3]);

@@ -5,11 +5,11 @@
 use std::collections::BTreeMap;
 
 use firmware_core::evaluate::Cursor;
-use firmware_core::proof::MARGIN;
 use firmware_core::table::{CheckedTable, TableView};
 use planner::feed::pack::Packed;
 use planner::job::gcode::Options;
 use planner::job::machine::{LimitSet, Machine};
+use protocol::table::rules::USUAL_MARGIN;
 use protocol::table::{AxisHeader, AxisLimit, Limits, TableError, TableHeader};
 use tests::chain;
 use tests::tables::{COARSE, FINE, Random, Sample};
@@ -41,7 +41,7 @@ impl Parts {
     }
 
     fn view(&self) -> Result<TableView<'_>, TableError> {
-        TableView::new(self.header, self.axis, &self.shared, &self.controls)
+        TableView::new(&self.header, &self.axis, &self.shared, &self.controls)
     }
 }
 
@@ -136,7 +136,7 @@ fn no_table_that_breaks_its_limits_is_accepted() {
             let seen = peaks(&table);
             let Limits { velocity, acceleration, jerk } = parts.axis.limits;
             for (seen, limit) in seen.into_iter().zip([velocity, acceleration, jerk.unwrap()]) {
-                let most = f64::from(limit) * (1.0 + f64::from(MARGIN) + SEEN);
+                let most = f64::from(limit) * (1.0 + f64::from(USUAL_MARGIN) * 1e-3 + SEEN);
                 assert!(seen <= most, "case {case}: {seen} above {limit}: {:?}", parts.axis);
             }
         }

@@ -1,4 +1,9 @@
 use super::*;
+use crate::guard::Guard;
+use protocol::message::{Fault, Reject, State};
+use protocol::power::{Power, PowerEvent};
+use protocol::table::warp::{ONE, RATE_ONE, Warp};
+use protocol::table::{AxisLimit, Limits, TableHeader};
 use protocol::message::{Part, part_crc};
 use protocol::table::control::ControlWriter;
 use protocol::table::geometry::{self, GeometrySpan};
@@ -10,8 +15,43 @@ use std::vec::Vec;
 
 const LIMITS: Limits = Limits { velocity: 1e6, acceleration: 1e8, jerk: Some(1e10) };
 
+/// rho 20/s, s'' 100/s^2, at 1 kHz: within the limits above by far.
+const WARP: Warp = Warp {
+    rate: ONE,
+    acceleration: ONE + ONE / 5,
+    jerk: ONE + 3 * (ONE / 10),
+    slope: (1 << 40) / 1000 * 20,
+    bend: RATE_ONE / 1_000_000 * 100,
+};
+
 fn config() -> AxisConfig {
-    AxisConfig { axis: 0, tick_ns: 1_000_000, position: 100, limits: LIMITS, travel: None, status_ticks: 0 }
+    AxisConfig { position: 100, ..AxisConfig::new(0, 1_000_000, LIMITS) }
+}
+
+/// A drive under torque.
+fn enabled<'a>(config: AxisConfig, a: &'a mut [u8], b: &'a mut [u8]) -> Player<'a> {
+    let mut player = Player::new(config, a, b);
+    player.handle(&HostMessage::Power(PowerEvent::Shutdown));
+    player.handle(&HostMessage::Power(PowerEvent::EnableOperation));
+    assert_eq!(player.status().power, Power::OperationEnabled);
+    player
+}
+
+/// Its shared header.
+fn header(table: u32, geometry_bytes: u32, span_bytes: u32) -> TableHeader {
+    TableHeader {
+        version: FORMAT_VERSION,
+        table,
+        spans: 5,
+        geometry_spans: 1,
+        step_exponent: -8,
+        q_scale: 1e-5,
+        tick_ns: 1_000_000,
+        geometry_bytes,
+        span_bytes,
+        margin: 5,
+        warp: Some(WARP),
+    }
 }
 
 /// A straight move of 8 u in one geometry span and five q spans, from 100 to 8100 counts.
@@ -25,17 +65,7 @@ fn bring(player: &mut Player<'_>, table: u32) {
     writer.push(&mut spans, None, None);
     let (mut controls, mut points) = (Vec::new(), ControlWriter::default());
     [0, 8000, 16_000, 24_000].into_iter().for_each(|p| points.push(&mut controls, p / 3 + 100));
-    let header = TableHeader {
-        version: FORMAT_VERSION,
-        table,
-        spans: 5,
-        geometry_spans: 1,
-        step_exponent: -8,
-        q_scale: 1e-5,
-        tick_ns: 1_000_000,
-        geometry_bytes: shared.len() as u32,
-        span_bytes: spans.len() as u32,
-    };
+    let header = header(table, shared.len() as u32, spans.len() as u32);
     shared.extend(spans);
     let control_bytes = controls.len() as u32;
     let axis =
@@ -54,7 +84,7 @@ fn bring(player: &mut Player<'_>, table: u32) {
 #[test]
 fn a_move_runs_through_all_states_to_its_end() {
     let (mut a, mut b) = ([0; 64], [0; 64]);
-    let mut player = Player::new(config(), &mut a, &mut b);
+    let mut player = enabled(config(), &mut a, &mut b);
     assert_eq!(player.status().state, State::Idle);
     bring(&mut player, 4);
     let Some(DriveMessage::Ready { table: 4, ticks, .. }) = player.poll_answer() else { panic!() };
@@ -76,12 +106,12 @@ fn a_move_runs_through_all_states_to_its_end() {
 #[test]
 fn memory_that_changes_under_a_running_table_is_a_fault_that_stays() {
     let (mut a, mut b) = ([0; 64], [0; 64]);
-    let mut player = Player::new(config(), &mut a, &mut b);
+    let mut player = enabled(config(), &mut a, &mut b);
     bring(&mut player, 4);
     player.handle(&HostMessage::Start { table: 4, tick: 0 });
     let moving = (0..100).map(|_| player.tick()).last().unwrap();
     assert!(moving.position > 100);
-    player.a.corrupt();
+    player.motion.corrupt();
     let mut before = moving;
     let stopped = loop {
         let now = player.tick();
@@ -96,13 +126,17 @@ fn memory_that_changes_under_a_running_table_is_a_fault_that_stays() {
     assert!(stopped.position < 8100);
     let status = player.status();
     let error = TableError::Truncated { stream: Stream::Spans, index: 3 };
-    assert_eq!((status.state, status.fault), (State::Fault, Some(Fault::Table { table: 4, error })));
+    assert_eq!((status.power, status.fault), (Power::Fault, Some(Fault::Table { table: 4, error })));
     let _ready = player.poll_answer();
     bring(&mut player, 5);
     player.handle(&HostMessage::Start { table: 5, tick: 1 << 40 });
+    let mut refused = 0;
     while let Some(answer) = player.poll_answer() {
-        assert_eq!(answer, DriveMessage::Reject { table: 5, reason: Reject::Fault });
+        if let DriveMessage::Reject { table: 5, reason: Reject::Fault } = answer {
+            refused += 1;
+        }
     }
+    assert_eq!(refused, 1);
     assert_eq!(player.tick(), stopped);
     assert_eq!(player.status().fault, status.fault);
     player.handle(&HostMessage::QuickStop);
@@ -116,11 +150,11 @@ fn a_set_point_beyond_the_limits_is_a_fault_and_comes_to_rest() {
         (Limits { acceleration: 10.0, ..LIMITS }, AxisLimit::Acceleration),
     ] {
         let (mut a, mut b) = ([0; 64], [0; 64]);
-        let mut player = Player::new(config(), &mut a, &mut b);
+        let mut player = enabled(config(), &mut a, &mut b);
         bring(&mut player, 4);
         player.handle(&HostMessage::Start { table: 4, tick: 0 });
         // As if the axis had learnt of lower limits than its tables were proven for.
-        player.config.limits = slower;
+        player.motion.set_guard(Guard::new(&AxisConfig { limits: slower, ..config() }));
         let mut rest = None;
         for _ in 0..1_000_000 {
             let now = player.tick();
@@ -131,7 +165,7 @@ fn a_set_point_beyond_the_limits_is_a_fault_and_comes_to_rest() {
         }
         assert!(rest.unwrap().position < 8100);
         assert_eq!(player.status().fault, Some(Fault::Limit(limit)));
-        assert_eq!(player.status().state, State::Fault);
+        assert_eq!(player.status().power, Power::Fault);
     }
 }
 
@@ -139,7 +173,7 @@ fn a_set_point_beyond_the_limits_is_a_fault_and_comes_to_rest() {
 fn an_axis_goes_where_it_is_sent_and_changes_its_mind_on_the_way() {
     let (mut a, mut b) = ([0; 64], [0; 64]);
     let config = AxisConfig { travel: Some([-2_000_000, 2_000_000]), ..config() };
-    let mut player = Player::new(config, &mut a, &mut b);
+    let mut player = enabled(config, &mut a, &mut b);
     let go = |player: &mut Player<'_>, position, velocity| {
         player.handle(&HostMessage::MoveTo { position, velocity });
         match player.poll_answer() {
@@ -168,12 +202,15 @@ fn an_axis_goes_where_it_is_sent_and_changes_its_mind_on_the_way() {
     }
     assert_eq!((before, player.status().state), (Setpoint::at_rest(-5), State::Holding));
     // Not while a table plays or waits.
-    let mut moved = Player::new(self::config(), &mut a, &mut b);
+    drop(player);
+    let mut moved = enabled(self::config(), &mut a, &mut b);
     bring(&mut moved, 4);
     moved.handle(&HostMessage::Start { table: 4, tick: 50 });
     assert!(matches!(moved.poll_answer(), Some(DriveMessage::Ready { .. })));
     assert_eq!(go(&mut moved, 7, None), Some(Reject::Busy));
     moved.handle(&HostMessage::QuickStop);
+    assert_eq!(go(&mut moved, 70_000, None), Some(Reject::Power(Power::QuickStopActive)));
+    moved.handle(&HostMessage::Power(PowerEvent::EnableOperation));
     assert_eq!(go(&mut moved, 70_000, None), None);
     // A quick stop ends a move, too.
     (0..20).for_each(|_| {
@@ -186,7 +223,7 @@ fn an_axis_goes_where_it_is_sent_and_changes_its_mind_on_the_way() {
 #[test]
 fn telemetry_follows_each_status_where_the_position_is_known() {
     let (mut a, mut b) = ([0; 64], [0; 64]);
-    let mut player = Player::new(AxisConfig { status_ticks: 10, ..config() }, &mut a, &mut b);
+    let mut player = enabled(AxisConfig { status_ticks: 10, ..config() }, &mut a, &mut b);
     for tick in 0..10 {
         player.tick();
         player.observe(100 + tick % 2);
@@ -209,13 +246,14 @@ fn telemetry_follows_each_status_where_the_position_is_known() {
 #[test]
 fn a_quick_stop_at_rest_forgets_tables_and_no_more() {
     let (mut a, mut b) = ([0; 64], [0; 64]);
-    let mut player = Player::new(config(), &mut a, &mut b);
+    let mut player = enabled(config(), &mut a, &mut b);
     bring(&mut player, 4);
     player.handle(&HostMessage::Start { table: 4, tick: 3 });
     player.handle(&HostMessage::QuickStop);
     assert!((0..100).all(|_| player.tick() == Setpoint::at_rest(100)));
     assert_eq!(player.status().state, State::Idle);
     // A new table is taken from where the axis stands.
+    player.handle(&HostMessage::Power(PowerEvent::EnableOperation));
     bring(&mut player, 5);
     player.handle(&HostMessage::Start { table: 5, tick: 200 });
     assert_eq!(player.status().state, State::Armed);
@@ -224,7 +262,7 @@ fn a_quick_stop_at_rest_forgets_tables_and_no_more() {
 #[test]
 fn answers_that_nobody_fetches_keep_the_newest() {
     let (mut a, mut b) = ([0; 64], [0; 64]);
-    let mut player = Player::new(AxisConfig { status_ticks: 1, ..config() }, &mut a, &mut b);
+    let mut player = enabled(AxisConfig { status_ticks: 1, ..config() }, &mut a, &mut b);
     (0..100).for_each(|_| {
         player.tick();
     });
@@ -234,3 +272,6 @@ fn answers_that_nobody_fetches_keep_the_newest() {
     let newest = DriveMessage::Reject { table: 19, reason: Reject::NotReady };
     assert_eq!(answers.last(), Some(&newest));
 }
+
+mod power;
+mod rate;

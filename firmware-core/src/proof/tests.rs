@@ -1,3 +1,4 @@
+use protocol::table::rules::USUAL_MARGIN;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -73,8 +74,8 @@ proptest! {
         let found = sampled(&p, &s);
         let mut factors = [2.0; 3];
         factors[tight] = factor;
-        let verdict = Granted::new(&limits(found, factors)).span(&p, &s);
-        if factor * (1.0 + f64::from(MARGIN)) < 1.0 - 1e-5 {
+        let verdict = Granted::new(&limits(found, factors), USUAL_MARGIN).span(&p, &s);
+        if factor * (1.0 + f64::from(USUAL_MARGIN) * 1e-3) < 1.0 - 1e-5 {
             let name = [AxisLimit::Velocity, AxisLimit::Acceleration, AxisLimit::Jerk][tight];
             prop_assert_eq!(verdict, Err(name));
         }
@@ -92,8 +93,8 @@ proptest! {
         let rest = Rest { h, rate };
         let mut factors = [2.0; 3];
         factors[tight] = factor;
-        let verdict = Granted::new(&limits(sampled_rest(&p, &rest), factors)).rest(&p, &rest);
-        if factor * (1.0 + f64::from(MARGIN)) < 1.0 - 1e-5 {
+        let verdict = Granted::new(&limits(sampled_rest(&p, &rest), factors), USUAL_MARGIN).rest(&p, &rest);
+        if factor * (1.0 + f64::from(USUAL_MARGIN) * 1e-3) < 1.0 - 1e-5 {
             let name = [AxisLimit::Velocity, AxisLimit::Acceleration, AxisLimit::Jerk][tight];
             prop_assert_eq!(verdict, Err(name));
         }
@@ -109,7 +110,7 @@ proptest! {
         n[which] = f32::NAN;
         let p = Slopes { p1: n[0], p2: n[1], p3: n[2], sizes: [n[0].abs(), n[1].abs(), n[2].abs()] };
         let s = Speed { h: n[3], q0: n[4], d: n[5], gamma: n[6] };
-        let granted = Granted::new(&Limits { velocity: 1e30, acceleration: 1e30, jerk: Some(1e30) });
+        let granted = Granted::new(&Limits { velocity: 1e30, acceleration: 1e30, jerk: Some(1e30) }, USUAL_MARGIN);
         prop_assert!(granted.span(&p, &s).is_err());
     }
 }
@@ -119,7 +120,7 @@ fn jerk_that_is_not_limited_is_not_looked_at() {
     let p = slopes(1.0, 1.0, 0.0, 0.0);
     let s = Speed { h: 1.0, q0: 1.0, d: 0.1, gamma: 0.1 };
     let mut limits = Limits { velocity: 2.0, acceleration: 2.0, jerk: Some(1e-3) };
-    assert_eq!(Granted::new(&limits).span(&p, &s), Err(AxisLimit::Jerk));
+    assert_eq!(Granted::new(&limits, USUAL_MARGIN).span(&p, &s), Err(AxisLimit::Jerk));
     limits.jerk = None;
-    assert_eq!(Granted::new(&limits).span(&p, &s), Ok(()));
+    assert_eq!(Granted::new(&limits, USUAL_MARGIN).span(&p, &s), Ok(()));
 }

@@ -53,7 +53,7 @@ pub fn play(bytes: &[u8], mut around: impl FnMut(Option<u32>, &mut dyn FnMut()))
     for [header, axis, shared, controls] in Stored::new(bytes) {
         let header: TableHeader = protocol::message::decode(header).ok()?;
         let axis: AxisHeader = protocol::message::decode(axis).ok()?;
-        let view = TableView::new(header, axis, shared, controls).ok()?;
+        let view = TableView::new(&header, &axis, shared, controls).ok()?;
         let mut checked = None;
         around(Some(header.spans), &mut || checked = view.prove(None).ok());
         let table = checked?;

@@ -1,7 +1,7 @@
 use super::*;
 use crate::bus::{BLOCK_BYTES, FrameSize, Reassembler, Segments};
 use crate::schema;
-use crate::table::{AxisLimit, HeaderField, Limits, Stream};
+use crate::table::{AxisLimit, HeaderField, Limits, Stream, Warp};
 use proptest::prelude::*;
 
 extern crate std;
@@ -22,7 +22,11 @@ const HEADER: TableHeader = TableHeader {
     tick_ns: 1_000_000,
     geometry_bytes: 3,
     span_bytes: 10,
+    margin: 5,
+    warp: None,
 };
+
+const WARP: Warp = Warp { rate: 1, acceleration: 2, jerk: 3, slope: 4, bend: 5 };
 
 const AXIS: AxisHeader = AxisHeader {
     table: 300,
@@ -38,8 +42,8 @@ const AXIS: AxisHeader = AxisHeader {
 fn host_messages_are_pinned() {
     let data = HostMessage::Data { table: 300, part: Part::Axis, offset: 5, bytes: &[7, 8] };
     let seal = HostMessage::Seal { table: 1, part: Part::Shared, crc: 0x80 };
-    let cases: [(HostMessage<'_>, &[u8]); 10] = [
-        (HostMessage::Open(HEADER), &[0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10]),
+    let cases: [(HostMessage<'_>, &[u8]); 15] = [
+        (HostMessage::Open(HEADER), &[0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10, 5, 0]),
         (
             HostMessage::OpenAxis(AXIS),
             &[1, 0xac, 2, 2, 4, 1, 0x80, 1, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x40, 1, 0, 0, 0x80, 0x40, 9],
@@ -52,6 +56,13 @@ fn host_messages_are_pinned() {
         (HostMessage::QuickStop, &[7]),
         (HostMessage::MoveTo { position: -1, velocity: None }, &[8, 1, 0]),
         (HostMessage::MoveTo { position: 1, velocity: Some(1.0) }, &[8, 2, 1, 0, 0, 0x80, 0x3f]),
+        (HostMessage::MoveAt { velocity: -1.0 }, &[9, 0, 0, 0x80, 0xbf]),
+        (HostMessage::Power(PowerEvent::EnableOperation), &[10, 2]),
+        (HostMessage::Override { permille: 500, tick: 7 }, &[11, 0xf4, 3, 7]),
+        (HostMessage::Alive, &[12]),
+        (HostMessage::Open(TableHeader { warp: Some(WARP), ..HEADER }), &[
+            0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10, 5, 1, 1, 2, 3, 4, 5,
+        ]),
     ];
     for (message, golden) in cases {
         assert_eq!(bytes(&message), golden, "{message:?}");
@@ -64,7 +75,10 @@ fn drive_messages_are_pinned() {
     let reject = |reason| DriveMessage::Reject { table: 1, reason };
     let bend = TableError::Bend { index: 9 };
     let truncated = TableError::Truncated { stream: Stream::Controls, index: 200 };
-    let status = |state, fault| DriveMessage::Status(Status { state, fault, tick: 1, position: -2, fill: 3 });
+    let status = |state, fault| {
+        let power = Power::OperationEnabled;
+        DriveMessage::Status(Status { state, power, fault, tick: 1, position: -2, fill: 3 })
+    };
     let identity = Identity {
         version: [0, 1, 2],
         format: 1,
@@ -76,7 +90,7 @@ fn drive_messages_are_pinned() {
     };
     let telemetry =
         Telemetry { ticks: 200, following_max: 3, following_rms: 1.0, fill_ms: 5, worst_tick: 90 };
-    let cases: [(DriveMessage, &[u8]); 26] = [
+    let cases: [(DriveMessage, &[u8]); 31] = [
         (DriveMessage::Telemetry(telemetry), &[4, 0xc8, 1, 3, 0, 0, 0x80, 0x3f, 5, 90]),
         (reject(Reject::Target), &[1, 1, 14]),
         (
@@ -105,10 +119,18 @@ fn drive_messages_are_pinned() {
         (reject(Reject::Late { tick: 1 }), &[1, 1, 11, 1]),
         (reject(Reject::Overlap { tick: 2 }), &[1, 1, 12, 2]),
         (reject(Reject::Fault), &[1, 1, 13]),
-        (status(State::Idle, None), &[2, 0, 0, 1, 3, 3]),
-        (status(State::Running, None), &[2, 4, 0, 1, 3, 3]),
-        (status(State::Holding, None), &[2, 5, 0, 1, 3, 3]),
-        (status(State::Fault, Some(Fault::Table { table: 8, error: bend })), &[2, 6, 1, 0, 8, 7, 9, 1, 3, 3]),
+        (reject(Reject::Power(Power::SwitchedOn)), &[1, 1, 15, 2]),
+        (reject(Reject::Moves), &[1, 1, 16]),
+        (reject(Reject::Override), &[1, 1, 17]),
+        (status(State::Held, Some(Fault::Connection)), &[2, 6, 3, 1, 2, 1, 3, 3]),
+        (status(State::Idle, Some(Fault::Board { code: 300 })), &[2, 0, 3, 1, 3, 0xac, 2, 1, 3, 3]),
+        (status(State::Idle, None), &[2, 0, 3, 0, 1, 3, 3]),
+        (status(State::Running, None), &[2, 4, 3, 0, 1, 3, 3]),
+        (status(State::Holding, None), &[2, 5, 3, 0, 1, 3, 3]),
+        (
+            status(State::Holding, Some(Fault::Table { table: 8, error: bend })),
+            &[2, 5, 3, 1, 0, 8, 7, 9, 1, 3, 3],
+        ),
     ];
     for (message, golden) in cases {
         assert_eq!(bytes(&message), golden, "{message:?}");
@@ -118,7 +140,7 @@ fn drive_messages_are_pinned() {
 
 #[test]
 fn the_schema_is_pinned() {
-    assert_eq!(schema::HASH, 0x80a5_be70_4df7_a795, "{:#018x}", schema::HASH);
+    assert_eq!(schema::HASH, 0xfc46_5952_e90f_bcb3, "{:#018x}", schema::HASH);
 }
 
 #[test]
@@ -142,6 +164,8 @@ fn the_longest_headers_have_checksums() {
         tick_ns: most,
         geometry_bytes: most,
         span_bytes: most,
+        margin: u8::MAX,
+        warp: Some(Warp { rate: most, acceleration: most, jerk: most, slope: u64::MAX, bend: u64::MAX }),
     };
     let limits = Limits { velocity: 1.0, acceleration: 1.0, jerk: Some(1.0) };
     let (start, end) = (i64::MIN, i64::MIN);
@@ -155,7 +179,7 @@ fn the_longest_headers_have_checksums() {
 #[test]
 fn bytes_behind_a_message_are_refused() {
     assert_eq!(decode::<HostMessage<'_>>(&[5, 0]), Err(MessageError::LeftOver));
-    assert_eq!(decode::<HostMessage<'_>>(&[9]), Err(MessageError::Malformed));
+    assert_eq!(decode::<HostMessage<'_>>(&[13]), Err(MessageError::Malformed));
     assert_eq!(decode::<HostMessage<'_>>(&[]), Err(MessageError::Malformed));
     assert_eq!(encode(&HostMessage::Open(HEADER), &mut [0; 4]), Err(MessageError::NoRoom));
 }

@@ -39,6 +39,10 @@ pub enum HeaderField {
     FractionBits,
     /// Axis limits.
     Limits,
+    /// What the proof may grant.
+    Margin,
+    /// Bounds of override and hold: out of range, or too much for the axis' limits.
+    Warp,
 }
 
 /// Why bytes are not a table, or the table breaks a rule; `index` counts entries of the stream from 0.
@@ -161,6 +165,8 @@ impl fmt::Display for HeaderField {
             HeaderField::Length => "stream length",
             HeaderField::FractionBits => "fraction bits",
             HeaderField::Limits => "axis limits",
+            HeaderField::Margin => "margin",
+            HeaderField::Warp => "override",
         })
     }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::rules;
-use super::{HeaderField, TableError};
+use super::{HeaderField, TableError, Warp};
 
 /// Version of the table format; drives refuse any other.
 pub const FORMAT_VERSION: u8 = 1;
@@ -29,6 +29,10 @@ pub struct TableHeader {
     pub geometry_bytes: u32,
     /// Length of the span stream [bytes].
     pub span_bytes: u32,
+    /// What the drives' proofs may grant beyond every limit, at most [`rules::MAX_MARGIN`] [0.1 %].
+    pub margin: u8,
+    /// How path time may be slowed, held and hurried; none: not at all.
+    pub warp: Option<Warp>,
 }
 
 /// Header of one axis' part.
@@ -82,6 +86,12 @@ impl TableHeader {
         }
         if self.tick_ns == 0 || self.tick_ns > 1_000_000_000 {
             return refuse(HeaderField::Tick);
+        }
+        if self.margin > rules::MAX_MARGIN {
+            return refuse(HeaderField::Margin);
+        }
+        if self.warp.is_some_and(|warp| !warp.is_valid()) {
+            return refuse(HeaderField::Warp);
         }
         Ok(())
     }

@@ -40,5 +40,11 @@ pub const fn nearest_count(control: i64, fraction_bits: u8) -> i64 {
     (control.saturating_add(1 << (fraction_bits - 1))) >> fraction_bits
 }
 
+/// Largest margin of a table [0.1 %].
+pub const MAX_MARGIN: u8 = 15;
+
+/// The margin of a table that was planned with one cell per span [0.1 %].
+pub const USUAL_MARGIN: u8 = 5;
+
 /// Largest code: exact in f32.
 pub const MAX_CODE: u32 = (1 << 24) - 1;

@@ -93,6 +93,7 @@ fn control_points_are_bounded() {
 
 #[test]
 fn header_fields_are_checked_by_name() {
+    let still = Warp { rate: 1 << 24, acceleration: 1 << 24, jerk: 1 << 24, slope: 1, bend: 1 };
     let good = TableHeader {
         version: FORMAT_VERSION,
         table: 1,
@@ -103,6 +104,8 @@ fn header_fields_are_checked_by_name() {
         tick_ns: 1_000_000,
         geometry_bytes: 1,
         span_bytes: 1,
+        margin: 5,
+        warp: None,
     };
     assert_eq!(good.check(), Ok(()));
     assert_eq!(good.step(), 1.0 / 1024.0);
@@ -116,6 +119,8 @@ fn header_fields_are_checked_by_name() {
         (TableHeader { q_scale: f32::INFINITY, ..good }, HeaderField::QScale),
         (TableHeader { q_scale: 0.0, ..good }, HeaderField::QScale),
         (TableHeader { tick_ns: 0, ..good }, HeaderField::Tick),
+        (TableHeader { margin: 16, ..good }, HeaderField::Margin),
+        (TableHeader { warp: Some(still), ..good }, HeaderField::Warp),
     ];
     for (header, field) in cases {
         assert_eq!(header.check(), Err(TableError::Header(field)));

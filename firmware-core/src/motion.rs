@@ -1,0 +1,612 @@
+//! The half of a drive that moves: one set-point per control tick, whatever happens.
+//!
+//! Every table ends at rest, so whatever fails to arrive, the axis comes to rest on its path. An override changes the rate
+//! of path time, down to a hold, on the path. A quick stop, a table that is not what was checked, or a set-point beyond the
+//! axis' limits leaves the path: the axis comes to rest by a double-S from the set-point before, within its limits. Faults
+//! stay latched with their first cause. At rest the axis may be sent to a position or a velocity.
+
+use heapless::Vec;
+use protocol::message::{Fault, Reject, State, Status};
+use protocol::power::{Power, PowerEvent};
+use protocol::table::warp::RATE_ONE;
+
+use crate::axis::{AxisConfig, FaultOption, LostOption, QuickStopOption};
+use crate::course::Course;
+use crate::evaluate::{Cursor, Setpoint};
+use crate::guard::Guard;
+use crate::orders::{Order, Report};
+use crate::rate::{Pace, Rate, of_permille};
+use crate::store::Loaded;
+use crate::telemetry::Window;
+use crate::time::{PathClock, tick_time, ticks_until};
+
+/// Largest commanded rate [0.1 %].
+const MOST_PERMILLE: u16 = 2000;
+
+/// Where orders come from and reports go; neither ever waits.
+pub trait Link<'a> {
+    /// The oldest order.
+    fn next_order(&mut self) -> Option<Order<'a>>;
+
+    /// Hands a report over.
+    ///
+    /// # Errors
+    /// The report, when there is no room for it.
+    fn report(&mut self, report: Report<'a>) -> Result<(), Report<'a>>;
+}
+
+/// A table that plays.
+#[derive(Debug)]
+struct Playing<'a> {
+    table: Loaded<'a>,
+    cursor: Cursor,
+    clock: PathClock,
+    /// Tick at which it will have come to rest, if the rate is 1 from now on.
+    end: u64,
+}
+
+/// A table that will start.
+#[derive(Debug)]
+struct Armed<'a> {
+    table: Loaded<'a>,
+    tick: u64,
+}
+
+/// Motion without a table.
+#[derive(Clone, Debug)]
+struct Excursion {
+    course: Course,
+    /// It only comes to rest.
+    stops: bool,
+}
+
+/// A rate of path time that begins at a tick.
+#[derive(Clone, Copy, Debug)]
+struct Change {
+    target: u64,
+    tick: u64,
+}
+
+/// The half that moves.
+#[derive(Debug)]
+pub struct Motion<'a> {
+    config: AxisConfig,
+    guard: Guard,
+    /// Number of the next tick.
+    tick: u64,
+    status_in: u32,
+    /// Ticks since the host was heard.
+    silence: u32,
+    power: Power,
+    fault: Option<Fault>,
+    /// The set-point that was given last.
+    last: Setpoint,
+    excursion: Option<Excursion>,
+    playing: Option<Playing<'a>>,
+    armed: Option<Armed<'a>>,
+    rate: Rate,
+    change: Option<Change>,
+    /// Path time lost by rates below 1 that is not yet a whole tick [2^-32 s].
+    lag: i64,
+    has_played: bool,
+    window: Window,
+    /// Tables that wait to be given back.
+    back: Vec<(Loaded<'a>, bool), 3>,
+}
+
+impl<'a> Motion<'a> {
+    /// An axis at rest, without torque.
+    pub fn new(config: AxisConfig) -> Self {
+        Self {
+            config,
+            guard: Guard::new(&config),
+            tick: 0,
+            status_in: config.status_ticks,
+            silence: 0,
+            power: Power::SwitchOnDisabled,
+            fault: None,
+            last: Setpoint::at_rest(config.position),
+            excursion: None,
+            playing: None,
+            armed: None,
+            rate: Rate::default(),
+            change: None,
+            lag: 0,
+            has_played: false,
+            window: Window::default(),
+            back: Vec::new(),
+        }
+    }
+
+    /// The set-point of this tick; call it once per control tick.
+    pub fn tick(&mut self, link: &mut impl Link<'a>) -> Setpoint {
+        self.take_orders(link);
+        self.listen();
+        let setpoint = self.set_point();
+        self.last = setpoint;
+        if setpoint.done {
+            self.settle();
+        }
+        self.tick = self.tick.saturating_add(1);
+        if self.config.status_ticks > 0 {
+            self.status_in = self.status_in.saturating_sub(1);
+            if self.status_in == 0 {
+                self.tell(link);
+            }
+        }
+        setpoint
+    }
+
+    /// Does what was ordered, up to the first order that takes planning.
+    pub fn take_orders(&mut self, link: &mut impl Link<'a>) {
+        while let Some(order) = link.next_order() {
+            self.silence = 0;
+            let (table, result, plans) = self.obey(order);
+            if let Err(reason) = result {
+                // Nobody listens if there is no room: the host asks again.
+                let _ = link.report(Report::Reject { table, reason });
+            }
+            if plans {
+                break;
+            }
+        }
+        while let Some((table, kept)) = self.back.pop() {
+            if let Err(Report::Back { table, kept }) = link.report(Report::Back { table, kept }) {
+                let _ = self.back.push((table, kept));
+                break;
+            }
+        }
+    }
+
+    /// Tells where the axis really is, after [`Motion::tick`]: for the telemetry that follows each status.
+    pub fn observe(&mut self, actual: i64) {
+        self.window.follow(self.last.position, actual);
+    }
+
+    /// Tells what a tick has cost, in whatever the board counts.
+    pub fn observe_cost(&mut self, count: u32) {
+        self.window.cost(count);
+    }
+
+    /// Tells where the axis is while it has no torque; a motion goes on from there. Under torque it is ignored.
+    pub fn place(&mut self, position: i64) {
+        if !self.power.has_torque() {
+            self.last = Setpoint::at_rest(position);
+        }
+    }
+
+    /// The board has found a fault.
+    pub fn trip(&mut self, code: u16) {
+        self.fail(Fault::Board { code });
+    }
+
+    /// The power state: what the power stage has to do.
+    pub fn power(&self) -> Power {
+        self.power
+    }
+
+    /// How the axis is.
+    #[inline(never)]
+    pub fn status(&self) -> Status {
+        let AxisConfig { tick_ns, .. } = self.config;
+        let armed = |armed: &Armed<'_>| {
+            armed.tick.saturating_add(ticks_until(armed.table.duration(), tick_ns))
+        };
+        let strays = |way: &Excursion| {
+            way.course.left().map_or(u64::MAX, |left| self.tick.saturating_add(left))
+        };
+        let end = self.excursion.as_ref().map(strays).or(self.armed.as_ref().map(armed));
+        let end = end.or(self.playing.as_ref().map(|p| p.end)).unwrap_or(self.tick);
+        Status {
+            state: self.state(),
+            power: self.power,
+            fault: self.fault,
+            tick: self.tick,
+            position: self.last.position,
+            fill: end.saturating_sub(self.tick),
+        }
+    }
+
+    fn state(&self) -> State {
+        if let Some(excursion) = &self.excursion {
+            if excursion.stops { State::Stopping } else { State::Moving }
+        } else if self.playing.is_some() {
+            if self.rate.is_held() { State::Held } else { State::Running }
+        } else if self.armed.is_some() {
+            State::Armed
+        } else if self.has_played {
+            State::Holding
+        } else {
+            State::Idle
+        }
+    }
+
+    /// The number of the table that an order is about, what came of it, and whether it took planning.
+    fn obey(&mut self, order: Order<'a>) -> (u32, Result<(), Reject>, bool) {
+        match order {
+            Order::Start { table, tick } => {
+                let number = table.number();
+                match self.may_start(&table, tick) {
+                    Ok(()) => {
+                        self.armed = Some(Armed { table, tick });
+                        (number, Ok(()), false)
+                    }
+                    Err(reason) => {
+                        self.give_back(table, true);
+                        (number, Err(reason), false)
+                    }
+                }
+            }
+            Order::StartAgain { table, tick } => {
+                let plays = self.playing.as_ref().is_some_and(|p| p.table.number() == table);
+                let waits =
+                    self.armed.as_ref().is_some_and(|a| a.table.number() == table && a.tick == tick);
+                let reason = if self.armed.is_some() { Reject::Busy } else { Reject::NotReady };
+                (table, if plays || waits { Ok(()) } else { Err(reason) }, false)
+            }
+            Order::Stop => {
+                self.disarm();
+                (0, Ok(()), false)
+            }
+            Order::MoveTo { position, velocity } => (0, self.move_to(position, velocity), true),
+            Order::MoveAt { velocity } => (0, self.move_at(velocity), true),
+            Order::Power(event) => (0, self.change_power(event), event == PowerEvent::QuickStop),
+            Order::Override { permille, tick } => (0, self.change_rate(permille, tick), false),
+            Order::Alive => (0, Ok(()), false),
+        }
+    }
+
+    /// Whether a table may be armed for a tick.
+    #[inline(never)]
+    fn may_start(&self, table: &Loaded<'_>, tick: u64) -> Result<(), Reject> {
+        self.refuse_without_torque()?;
+        if self.excursion.is_some() || self.armed.is_some() {
+            return Err(Reject::Busy);
+        }
+        if tick < self.tick {
+            return Err(Reject::Late { tick: self.tick });
+        }
+        if let Some(playing) = self.playing.as_ref().filter(|playing| tick < playing.end) {
+            return Err(Reject::Overlap { tick: playing.end });
+        }
+        let ends = self.playing.as_ref().map(|p| p.table.axis().end);
+        let position = ends.unwrap_or(self.last.position);
+        if table.axis().start != position {
+            return Err(Reject::Position { position });
+        }
+        if table.header().warp.is_none() && !self.rate.is_plain() {
+            return Err(Reject::Override);
+        }
+        Ok(())
+    }
+
+    /// Sets out for a position, from rest or from the way to another one.
+    #[inline(never)]
+    fn move_to(&mut self, position: i64, velocity: Option<f32>) -> Result<(), Reject> {
+        self.refuse_to_stray()?;
+        let AxisConfig { mut limits, tick_ns, travel, .. } = self.config;
+        let slower = velocity.unwrap_or(limits.velocity);
+        let sensible = slower > 0.0 && travel.is_none_or(|[low, high]| (low..=high).contains(&position));
+        if !sensible {
+            return Err(Reject::Target);
+        }
+        limits.velocity = slower.min(limits.velocity);
+        let course = Course::to(&self.last, position, &limits, tick_ns).map_err(|_| Reject::Target)?;
+        self.excursion = Some(Excursion { course, stops: false });
+        Ok(())
+    }
+
+    /// Goes at a velocity; towards the end of the travel, where there is one.
+    #[inline(never)]
+    fn move_at(&mut self, velocity: f32) -> Result<(), Reject> {
+        let AxisConfig { limits, tick_ns, travel, .. } = self.config;
+        let admissible = velocity.abs() <= limits.velocity;
+        if !admissible {
+            return Err(Reject::Target);
+        }
+        if velocity != 0.0
+            && let Some([low, high]) = travel
+        {
+            return self.move_to(if velocity > 0.0 { high } else { low }, Some(velocity.abs()));
+        }
+        self.refuse_to_stray()?;
+        let course =
+            Course::to_velocity(&self.last, velocity, &limits, tick_ns).map_err(|_| Reject::Target)?;
+        self.excursion = Some(Excursion { course, stops: false });
+        Ok(())
+    }
+
+    /// A command that changes the power state.
+    #[inline(never)]
+    fn change_power(&mut self, event: PowerEvent) -> Result<(), Reject> {
+        let to = self.power.after(event).ok_or(Reject::Power(self.power))?;
+        let enabled = self.power == Power::OperationEnabled;
+        match event {
+            // Nobody but the drive itself knows of these.
+            PowerEvent::Fault | PowerEvent::Stopped => return Err(Reject::Power(self.power)),
+            PowerEvent::Shutdown | PowerEvent::DisableOperation if enabled && self.moves() => {
+                return Err(Reject::Moves);
+            }
+            PowerEvent::EnableOperation if !enabled && self.moves() => return Err(Reject::Moves),
+            PowerEvent::ResetFault => self.fault = None,
+            _ => {}
+        }
+        self.power = to;
+        let stops = self.config.options.quick_stop != QuickStopOption::Disable;
+        match to {
+            Power::QuickStopActive if stops => self.land(),
+            Power::QuickStopActive => {
+                self.freeze();
+                self.power = Power::SwitchOnDisabled;
+            }
+            Power::OperationEnabled => {}
+            _ => self.freeze(),
+        }
+        Ok(())
+    }
+
+    /// A command that changes the rate of path time.
+    fn change_rate(&mut self, permille: u16, tick: u64) -> Result<(), Reject> {
+        if tick < self.tick {
+            return Err(Reject::Late { tick: self.tick });
+        }
+        let target = of_permille(permille);
+        let admitted = self.playing.as_ref().is_none_or(|playing| {
+            playing.table.header().warp.is_some_and(|warp| target <= u64::from(warp.rate) << 24)
+        });
+        if permille > MOST_PERMILLE || !admitted {
+            return Err(Reject::Override);
+        }
+        self.change = Some(Change { target, tick });
+        Ok(())
+    }
+
+    /// Counts how long the host has been silent.
+    fn listen(&mut self) {
+        self.silence = self.silence.saturating_add(1);
+        let options = self.config.options;
+        if options.lost_ticks == 0 || self.silence <= options.lost_ticks || !self.power.has_torque() {
+            return;
+        }
+        match options.lost {
+            LostOption::Nothing => {}
+            LostOption::Fault => self.fail(Fault::Connection),
+            LostOption::Disable => {
+                let _ = self.change_power(PowerEvent::DisableVoltage);
+            }
+            LostOption::QuickStop => {
+                if self.power == Power::OperationEnabled {
+                    let _ = self.change_power(PowerEvent::QuickStop);
+                }
+            }
+        }
+    }
+
+    fn set_point(&mut self) -> Setpoint {
+        if self.excursion.is_some() {
+            return self.stray();
+        }
+        if let Some(change) = self.change.filter(|change| change.tick <= self.tick) {
+            self.change = None;
+            self.rate.aim(change.target);
+        }
+        let planned = self.begin().and_then(|()| self.play()).and_then(|setpoint| {
+            let allowed = self.guard.check(&setpoint, self.last.position, self.rate.is_plain());
+            allowed.map(|()| setpoint).map_err(Fault::Limit)
+        });
+        planned.unwrap_or_else(|fault| {
+            self.fail(fault);
+            self.stray()
+        })
+    }
+
+    /// At the tick of the start, and when the table before it is at its end, the armed table becomes the one that plays.
+    fn begin(&mut self) -> Result<(), Fault> {
+        let due = self.armed.as_ref().is_some_and(|armed| armed.tick <= self.tick);
+        let free = || self.playing.as_ref().is_none_or(|p| p.clock.time() >= p.table.duration());
+        if !due || !free() {
+            return Ok(());
+        }
+        if let Some(before) = self.playing.take() {
+            self.give_back(before.table, false);
+        }
+        let Some(Armed { table, .. }) = self.armed.take() else { return Ok(()) };
+        let ticks = ticks_until(table.duration(), self.config.tick_ns);
+        let cursor = match table.table().map(|view| Cursor::new(&view)) {
+            Some(Ok(cursor)) => cursor,
+            Some(Err(error)) => {
+                let fault = Fault::Table { table: table.number(), error };
+                self.give_back(table, false);
+                return Err(fault);
+            }
+            None => return Ok(()),
+        };
+        // At rest the rate may be what it will.
+        let most = table.header().warp.map_or(RATE_ONE, |warp| u64::from(warp.rate) << 24);
+        self.rate.aim(self.rate.target().min(most));
+        self.rate.jump();
+        self.lag = 0;
+        let clock = PathClock::new(self.config.tick_ns);
+        self.playing = Some(Playing { table, cursor, clock, end: self.tick.saturating_add(ticks) });
+        Ok(())
+    }
+
+    fn play(&mut self) -> Result<Setpoint, Fault> {
+        let Some(playing) = &mut self.playing else {
+            self.rate.jump();
+            return Ok(Setpoint::at_rest(self.last.position));
+        };
+        let Some(table) = playing.table.table() else { return Ok(Setpoint::at_rest(self.last.position)) };
+        let setpoint = playing
+            .cursor
+            .evaluate(&table, playing.clock.time())
+            .map_err(|error| Fault::Table { table: table.header().table, error })?;
+        if setpoint.done {
+            if let Some(playing) = self.playing.take() {
+                self.give_back(playing.table, false);
+            }
+            self.has_played = true;
+            return Ok(setpoint);
+        }
+        if self.rate.is_plain() {
+            playing.clock.advance();
+            return Ok(setpoint);
+        }
+        let Some(warp) = &table.header().warp else {
+            playing.clock.advance();
+            return Ok(setpoint);
+        };
+        let pace = self.rate.advance(warp);
+        self.lag = self.lag.saturating_add(playing.clock.advance_at(pace.mean));
+        self.delay();
+        Ok(at_pace(&setpoint, &pace, self.config.tick_ns))
+    }
+
+    /// What is lost of path time puts off all that is planned, tick by whole tick.
+    fn delay(&mut self) {
+        let tick = tick_time(self.config.tick_ns) as i64;
+        let late = if self.lag >= tick {
+            1
+        } else if self.lag <= tick.saturating_neg() {
+            -1
+        } else {
+            return;
+        };
+        self.lag = self.lag.saturating_sub(tick.saturating_mul(late));
+        if let Some(playing) = &mut self.playing {
+            playing.end = playing.end.saturating_add_signed(late);
+        }
+        if let Some(armed) = &mut self.armed {
+            armed.tick = armed.tick.saturating_add_signed(late);
+        }
+    }
+
+    /// The next set-point of a motion without a table.
+    fn stray(&mut self) -> Setpoint {
+        let Some(excursion) = &mut self.excursion else { return Setpoint::at_rest(self.last.position) };
+        let setpoint = excursion.course.next();
+        if setpoint.done {
+            self.excursion = None;
+            self.has_played = true;
+        }
+        setpoint
+    }
+
+    /// A fault: its first cause is latched, and the axis comes to rest.
+    #[inline(never)]
+    fn fail(&mut self, fault: Fault) {
+        let Some(to) = self.power.after(PowerEvent::Fault) else { return };
+        self.fault = self.fault.or(Some(fault));
+        self.power = to;
+        match self.config.options.fault {
+            FaultOption::Stop => self.land(),
+            FaultOption::Disable => self.freeze(),
+        }
+    }
+
+    /// At rest: a reaction has ended.
+    fn settle(&mut self) {
+        let ends = match self.power {
+            Power::FaultReactionActive => true,
+            Power::QuickStopActive => self.config.options.quick_stop == QuickStopOption::StopAndDisable,
+            _ => false,
+        };
+        if ends && let Some(to) = self.power.after(PowerEvent::Stopped) {
+            self.power = to;
+        }
+    }
+
+    /// Leaves the path for the shortest way to rest; tables are forgotten. At rest there is nothing to do.
+    #[inline(never)]
+    fn land(&mut self) {
+        let lands = self.excursion.as_ref().is_some_and(|way| way.stops);
+        if !lands && !self.last.done {
+            let AxisConfig { limits, tick_ns, .. } = self.config;
+            // Without one, as when the set-point is no number, standing still at once is all that is left.
+            let course = Course::to_velocity(&self.last, 0.0, &limits, tick_ns).ok();
+            self.excursion = course.map(|course| Excursion { course, stops: true });
+        }
+        self.drop_tables();
+    }
+
+    /// Gives up every motion at once: without torque there is none.
+    fn freeze(&mut self) {
+        self.excursion = None;
+        self.last = Setpoint::at_rest(self.last.position);
+        self.drop_tables();
+    }
+
+    fn drop_tables(&mut self) {
+        if let Some(playing) = self.playing.take() {
+            self.give_back(playing.table, false);
+        }
+        self.disarm();
+        (self.rate, self.change) = (Rate::default(), None);
+    }
+
+    fn disarm(&mut self) {
+        if let Some(armed) = self.armed.take() {
+            self.give_back(armed.table, false);
+        }
+    }
+
+    fn give_back(&mut self, table: Loaded<'a>, kept: bool) {
+        // There are two buffers, and room for both.
+        let _ = self.back.push((table, kept));
+    }
+
+    #[inline(never)]
+    fn tell(&mut self, link: &mut impl Link<'a>) {
+        self.status_in = self.config.status_ticks;
+        let status = self.status();
+        let _ = link.report(Report::Status(status));
+        let fill_ms = status.fill.saturating_mul(u64::from(self.config.tick_ns)) / 1_000_000;
+        if let Some(telemetry) = self.window.take(u32::try_from(fill_ms).unwrap_or(u32::MAX)) {
+            let _ = link.report(Report::Telemetry(telemetry));
+        }
+    }
+
+    /// Something moves or is about to.
+    fn moves(&self) -> bool {
+        !self.last.done || self.excursion.is_some() || self.playing.is_some() || self.armed.is_some()
+    }
+
+    fn refuse_without_torque(&self) -> Result<(), Reject> {
+        match (self.fault, self.power) {
+            (Some(_), _) => Err(Reject::Fault),
+            (None, Power::OperationEnabled) => Ok(()),
+            (None, power) => Err(Reject::Power(power)),
+        }
+    }
+
+    fn refuse_to_stray(&self) -> Result<(), Reject> {
+        self.refuse_without_torque()?;
+        if self.playing.is_some() || self.armed.is_some() { Err(Reject::Busy) } else { Ok(()) }
+    }
+}
+
+/// A set-point of the path at another rate: v s, a s^2 + v s'.
+fn at_pace(setpoint: &Setpoint, pace: &Pace, tick_ns: u32) -> Setpoint {
+    let Setpoint { position, velocity, acceleration, done } = *setpoint;
+    let change = pace.change * (1e9 / tick_ns as f32);
+    Setpoint {
+        position,
+        velocity: velocity * pace.s,
+        acceleration: acceleration * pace.s * pace.s + velocity * change,
+        done,
+    }
+}
+
+#[cfg(test)]
+impl Motion<'_> {
+    /// Overwrites the bytes of the table that plays, as a memory error would.
+    pub(crate) fn corrupt(&mut self) {
+        if let Some(playing) = &mut self.playing {
+            playing.table.corrupt();
+        }
+    }
+
+    pub(crate) fn set_guard(&mut self, guard: Guard) {
+        self.guard = guard;
+    }
+}
