@@ -32,7 +32,6 @@ pub struct Excess {
     pub jerk: f32,
 }
 
-
 /// Option codes, after CiA 402; the standard's numbers are given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {

@@ -36,13 +36,13 @@ const fn number(digits: &str) -> u8 {
     }
 }
 
-/// Where orders go: they come back if there is no room.
+/// Where orders go. Nobody else sends any, so that room that was seen is still there.
 pub trait Orders<'a> {
-    /// Hands an order over.
-    ///
-    /// # Errors
-    /// The order, when there is no room for it.
-    fn send(&mut self, order: Order<'a>) -> Result<(), Order<'a>>;
+    /// There is room for an order.
+    fn has_room(&self) -> bool;
+
+    /// Hands an order over; without room it is lost.
+    fn send(&mut self, order: Order<'a>);
 }
 
 /// The half that talks.
@@ -119,10 +119,10 @@ impl<'a> Intake<'a> {
 
     /// What could not be ordered before is ordered now; call it now and then.
     pub fn retry(&mut self, orders: &mut dyn Orders<'a>) {
-        if let Some(event) = self.urgent
-            && orders.send(Order::Power(event)).is_ok()
+        if orders.has_room()
+            && let Some(event) = self.urgent.take()
         {
-            self.urgent = None;
+            orders.send(Order::Power(event));
         }
     }
 
@@ -219,15 +219,11 @@ impl<'a> Intake<'a> {
         if slot.is_away() {
             return order(orders, Order::StartAgain { table: number, tick });
         }
-        let table = slot.give().ok_or(Reject::NotReady)?;
-        match orders.send(Order::Start { table, tick }) {
-            Ok(()) => Ok(()),
-            Err(Order::Start { table, .. }) => {
-                self.take_back(table, true);
-                Err(Reject::Busy)
-            }
-            Err(_) => Err(Reject::Busy),
+        if !orders.has_room() {
+            return Err(Reject::Busy);
         }
+        orders.send(Order::Start { table: slot.give().ok_or(Reject::NotReady)?, tick });
+        Ok(())
     }
 
     /// Commands that take torque or motion away are never lost.
@@ -274,7 +270,11 @@ impl<'a> Intake<'a> {
 }
 
 fn order<'a>(orders: &mut dyn Orders<'a>, order: Order<'a>) -> Result<(), Reject> {
-    orders.send(order).map_err(|_| Reject::Busy)
+    if !orders.has_room() {
+        return Err(Reject::Busy);
+    }
+    orders.send(order);
+    Ok(())
 }
 
 /// No limit of the table is above the drive's, nor, at any rate that it admits, above what the drive grants then.

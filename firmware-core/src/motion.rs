@@ -28,11 +28,11 @@ pub trait Link<'a> {
     /// The oldest order.
     fn next_order(&mut self) -> Option<Order<'a>>;
 
-    /// Hands a report over.
-    ///
-    /// # Errors
-    /// The report, when there is no room for it.
-    fn report(&mut self, report: Report<'a>) -> Result<(), Report<'a>>;
+    /// There is room for a report. Nobody else makes any, so that room that was seen is still there.
+    fn has_room(&self) -> bool;
+
+    /// Hands a report over; without room it is lost.
+    fn report(&mut self, report: Report<'a>);
 }
 
 /// A table that plays.
@@ -144,17 +144,16 @@ impl<'a> Motion<'a> {
             let (table, result, plans) = self.obey(order);
             if let Err(reason) = result {
                 // Nobody listens if there is no room: the host asks again.
-                let _ = link.report(Report::Reject { table, reason });
+                link.report(Report::Reject { table, reason });
             }
             if plans {
                 break;
             }
         }
-        while let Some((table, kept)) = self.back.pop() {
-            if let Err(Report::Back { table, kept }) = link.report(Report::Back { table, kept }) {
-                let _ = self.back.push((table, kept));
-                break;
-            }
+        while link.has_room()
+            && let Some((table, kept)) = self.back.pop()
+        {
+            link.report(Report::Back { table, kept });
         }
     }
 
@@ -189,12 +188,10 @@ impl<'a> Motion<'a> {
     #[inline(never)]
     pub fn status(&self) -> Status {
         let AxisConfig { tick_ns, .. } = self.config;
-        let armed = |armed: &Armed<'_>| {
-            armed.tick.saturating_add(ticks_until(armed.table.duration(), tick_ns))
-        };
-        let strays = |way: &Excursion| {
-            way.course.left().map_or(u64::MAX, |left| self.tick.saturating_add(left))
-        };
+        let armed =
+            |armed: &Armed<'_>| armed.tick.saturating_add(ticks_until(armed.table.duration(), tick_ns));
+        let strays =
+            |way: &Excursion| way.course.left().map_or(u64::MAX, |left| self.tick.saturating_add(left));
         let end = self.excursion.as_ref().map(strays).or(self.armed.as_ref().map(armed));
         let end = end.or(self.playing.as_ref().map(|p| p.end)).unwrap_or(self.tick);
         Status {
@@ -239,8 +236,7 @@ impl<'a> Motion<'a> {
             }
             Order::StartAgain { table, tick } => {
                 let plays = self.playing.as_ref().is_some_and(|p| p.table.number() == table);
-                let waits =
-                    self.armed.as_ref().is_some_and(|a| a.table.number() == table && a.tick == tick);
+                let waits = self.armed.as_ref().is_some_and(|a| a.table.number() == table && a.tick == tick);
                 let reason = if self.armed.is_some() { Reject::Busy } else { Reject::NotReady };
                 (table, if plays || waits { Ok(()) } else { Err(reason) }, false)
             }
@@ -559,10 +555,10 @@ impl<'a> Motion<'a> {
     fn tell(&mut self, link: &mut impl Link<'a>) {
         self.status_in = self.config.status_ticks;
         let status = self.status();
-        let _ = link.report(Report::Status(status));
+        link.report(Report::Status(status));
         let fill_ms = status.fill.saturating_mul(u64::from(self.config.tick_ns)) / 1_000_000;
         if let Some(telemetry) = self.window.take(u32::try_from(fill_ms).unwrap_or(u32::MAX)) {
-            let _ = link.report(Report::Telemetry(telemetry));
+            link.report(Report::Telemetry(telemetry));
         }
     }
 

@@ -25,8 +25,12 @@ struct Queues<'a> {
 }
 
 impl<'a> Orders<'a> for Queues<'a> {
-    fn send(&mut self, order: Order<'a>) -> Result<(), Order<'a>> {
-        self.orders.push_back(order)
+    fn has_room(&self) -> bool {
+        !self.orders.is_full()
+    }
+
+    fn send(&mut self, order: Order<'a>) {
+        let _ = self.orders.push_back(order);
     }
 }
 
@@ -35,8 +39,12 @@ impl<'a> Link<'a> for Queues<'a> {
         self.orders.pop_front()
     }
 
-    fn report(&mut self, report: Report<'a>) -> Result<(), Report<'a>> {
-        self.reports.push_back(report)
+    fn has_room(&self) -> bool {
+        !self.reports.is_full()
+    }
+
+    fn report(&mut self, report: Report<'a>) {
+        let _ = self.reports.push_back(report);
     }
 }
 

@@ -140,7 +140,7 @@ mod tests {
     fn warp() -> Warp {
         let (slope, bend) = (((5e-3 * (1u64 << 40) as f64) as u64), (15e-6 * RATE_ONE as f64) as u64);
         let k = |k: f64| (k * f64::from(ONE)) as u32;
-        Warp { rate: k(1.2), acceleration: k(1.7), jerk: k(2.5), slope, bend }
+        Warp { rate: k(1.2) + 1, acceleration: k(1.7), jerk: k(2.5), slope, bend }
     }
 
     /// Goes on until the rate is steady; returns the ticks it took.

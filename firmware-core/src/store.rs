@@ -216,8 +216,7 @@ impl<'a> Slot<'a> {
     fn view(&self) -> Option<TableView<'_>> {
         let table = self.table.as_ref()?;
         let axis = table.axis.as_ref()?;
-        let (shared, rest) =
-            self.memory.as_ref()?.split_at_checked(table.header.shared_bytes() as usize)?;
+        let (shared, rest) = self.memory.as_ref()?.split_at_checked(table.header.shared_bytes() as usize)?;
         let controls = rest.get(..axis.control_bytes as usize)?;
         TableView::new(&table.header, axis, shared, controls).ok()
     }

@@ -47,6 +47,7 @@ pub(crate) mod tests {
             travel: [-100.0, 100.0],
             limits,
             rapid: limits,
+            headroom: [1.0; 3],
             plant: Plant {
                 inertia: 2.0,
                 viscous: 1.0,

@@ -11,6 +11,7 @@ use std::collections::VecDeque;
 use planner::feed::pack::Packed;
 use protocol::bus::{BLOCK_BYTES, FrameSize, Node, Reassembler, Segments, ids};
 use protocol::message::{DriveMessage, Fault, HostMessage, MessageBuffer, Reject, Status, decode, encode};
+use protocol::power::{Power, PowerEvent};
 
 use crate::bus::{Bus, Nanoseconds, NodeIndex};
 use upload::{Block, Upload};
@@ -118,6 +119,8 @@ pub struct HostNode<'a> {
     outbox: VecDeque<Command>,
     runs: VecDeque<Run>,
     lead_growth: u32,
+    /// When drives without torque are told again to enable operation.
+    enable_at: u64,
     counters: HostCounters,
 }
 
@@ -132,8 +135,13 @@ struct Link {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Command {
     Send(Block),
-    Start { table: u32, tick: u64 },
+    Start {
+        table: u32,
+        tick: u64,
+    },
     Stop,
+    /// To one drive, by its index.
+    Power(usize, PowerEvent),
 }
 
 #[derive(Debug)]
@@ -167,6 +175,7 @@ impl<'a> HostNode<'a> {
             outbox: VecDeque::new(),
             runs: VecDeque::new(),
             lead_growth: 0,
+            enable_at: 0,
             counters: HostCounters::default(),
         }
     }
@@ -221,17 +230,43 @@ impl<'a> HostNode<'a> {
         }
         match &mut self.phase {
             Phase::Idle => Ok(()),
+            // Commands on the way to torque may get lost and are repeated; what is refused then is no loss.
+            Phase::Uploading(_) if refused_without_torque(&message) => Ok(()),
             Phase::Uploading(upload) | Phase::Starting { upload, .. } => upload.answered(axis, &message),
         }
     }
 
     fn decide(&mut self, tick: u64, sent: bool) -> Result<(), HostError> {
+        if self.runs.is_empty() {
+            self.enable(tick);
+        }
         self.phase = match core::mem::replace(&mut self.phase, Phase::Idle) {
             Phase::Idle => self.begin(tick),
             Phase::Uploading(upload) => self.upload(upload, tick, sent)?,
             Phase::Starting { upload, run, repeat_at } => self.start(upload, run, repeat_at, tick)?,
         };
         Ok(())
+    }
+
+    /// Leads drives that do not follow set-points yet through their power states.
+    fn enable(&mut self, tick: u64) {
+        if tick < self.enable_at {
+            return;
+        }
+        self.enable_at = tick + self.timing.answer;
+        for (index, link) in self.drives.iter().enumerate() {
+            let commands: &[PowerEvent] = match link.status.map(|s| s.power) {
+                None | Some(Power::SwitchOnDisabled) => &[PowerEvent::Shutdown, PowerEvent::EnableOperation],
+                Some(Power::ReadyToSwitchOn | Power::SwitchedOn) => &[PowerEvent::EnableOperation],
+                Some(_) => &[],
+            };
+            self.outbox.extend(commands.iter().map(|&event| Command::Power(index, event)));
+        }
+    }
+
+    fn all_enabled(&self) -> bool {
+        let enabled = |s: Status| s.power == Power::OperationEnabled;
+        self.drives.iter().all(|link| link.status.is_some_and(enabled))
     }
 
     /// Takes up the next order once the drives have a buffer free: when the table before it plays.
@@ -251,6 +286,9 @@ impl<'a> HostNode<'a> {
 
     fn upload(&mut self, mut upload: Upload<'a>, tick: u64, sent: bool) -> Result<Phase<'a>, HostError> {
         if let Some(ticks) = upload.agreed()? {
+            if !self.all_enabled() {
+                return Ok(Phase::Uploading(upload));
+            }
             let earliest = tick + (self.timing.lead << self.lead_growth);
             let after = self.runs.back().map_or(0, |r| r.start + r.ticks + self.timing.handover);
             let start = earliest.max(after + self.orders[self.next].pause);
@@ -313,6 +351,10 @@ impl<'a> HostNode<'a> {
             }
             Command::Start { table, tick } => (ids::BROADCAST, HostMessage::Start { table, tick }),
             Command::Stop => (ids::STOP, HostMessage::Stop),
+            Command::Power(drive, event) => {
+                let Some(link) = self.drives.get(drive) else { return };
+                (link.address.to_drive(), HostMessage::Power(event))
+            }
         };
         let mut buffer: MessageBuffer = [0; _];
         // Every message fits the buffer: data is cut to `DATA_BYTES`.
@@ -321,4 +363,8 @@ impl<'a> HostNode<'a> {
             bus.send(self.node, frame, now);
         }
     }
+}
+
+fn refused_without_torque(message: &DriveMessage) -> bool {
+    matches!(message, DriveMessage::Reject { reason: Reject::Power(_) | Reject::Moves, .. })
 }

@@ -4,10 +4,10 @@ mod settings;
 
 pub use settings::{Loss, Progress, SimError, SimSettings};
 
+use firmware_core::axis::{AxisConfig, Excess};
 use firmware_core::drive::DriveConfig;
-use firmware_core::player::AxisConfig;
 use planner::feed::job::{JobItem, PlannedSection};
-use planner::feed::pack::{AxisScale, limits_in_counts, pack};
+use planner::feed::pack::{Target, limits_in_counts, pack};
 use planner::feed::table::FeedTable;
 use planner::geometry::grid_path::GridAxis;
 use planner::job::machine::{Axis, AxisLimits, Machine};
@@ -188,8 +188,8 @@ impl<'a> Programme<'a> {
     fn add_section(&mut self, section: &'a PlannedSection) -> Result<(), SimError> {
         let number = self.orders.len() as u32;
         let refuse = |source| SimError::Pack { table: number, source };
-        let scales = AxisScale::all(&self.machine.axes, &section.limits);
-        let packed = pack(&section.table, number, self.tick_ns, &scales).map_err(refuse)?;
+        let target = Target::of(self.machine, self.tick_ns, &section.limits);
+        let packed = pack(&section.table, number, &target).map_err(refuse)?;
         self.free_jerk |= section.limits.iter().any(|l| l.jerk == f64::INFINITY);
         self.end = programmed_end(&section.table, self.machine);
         if self.orders.is_empty() {
@@ -220,17 +220,16 @@ impl<'a> Programme<'a> {
             jerk,
         };
         let address = Node::new(axis as u8 + 1);
+        let rule = self.machine.override_rule;
         Ok(DriveConfig {
             node: address.ok_or(SimError::AxisCount { axes: self.machine.axes.len() })?,
             frames: settings.bus.format,
+            // The planner keeps programs within the travel; paths may leave it by their tolerance.
             axis: AxisConfig {
-                axis: axis as u8,
-                tick_ns: self.tick_ns,
                 position: self.origin[axis],
-                limits: limits_in_counts(&limits, a.counts_per_unit),
-                // The planner keeps programs within the travel; paths may leave it by their tolerance.
-                travel: None,
+                excess: Excess { acceleration: rule.acceleration as f32, jerk: rule.jerk as f32 },
                 status_ticks: settings.status_ticks(self.tick_s),
+                ..AxisConfig::new(axis as u8, self.tick_ns, limits_in_counts(&limits, a.counts_per_unit))
             },
         })
     }

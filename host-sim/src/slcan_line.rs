@@ -139,21 +139,14 @@ mod tests {
     use super::*;
     use std::os::unix::net::UnixStream;
 
+    use firmware_core::axis::AxisConfig;
     use firmware_core::drive::{Drive, DriveConfig};
-    use firmware_core::player::AxisConfig;
     use protocol::table::Limits;
 
     /// The drive core behind one end of a line, as an image has it; garbage comes before its first answer.
     fn drive(node: Node, mut line: UnixStream) {
         let limits = Limits { velocity: 1e5, acceleration: 1e6, jerk: Some(1e8) };
-        let axis = AxisConfig {
-            axis: node.number() - 1,
-            tick_ns: 1_000_000,
-            position: 0,
-            limits,
-            travel: None,
-            status_ticks: 1,
-        };
+        let axis = AxisConfig { status_ticks: 1, ..AxisConfig::new(node.number() - 1, 1_000_000, limits) };
         let config = DriveConfig { node, frames: FrameSize::Classic, axis };
         let (mut a, mut b) = ([0; 512], [0; 1024]);
         let mut drive = Drive::new(config, &mut a, &mut b);

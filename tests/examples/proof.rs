@@ -29,7 +29,7 @@ fn part(to: &mut Vec<u8>, bytes: &[u8]) {
 }
 
 fn header(to: &mut Vec<u8>, header: &impl Serialize) {
-    let mut buffer = [0u8; 64];
+    let mut buffer = [0u8; protocol::message::HEADER_BYTES];
     part(to, protocol::message::encode(header, &mut buffer).expect("headers are short"));
 }
 

@@ -5,7 +5,7 @@ use host_sim::scenario::{SimError, SimSettings, simulate};
 use host_sim::trace::PlotTrace;
 use planner::analysis::comparison::Comparison;
 use planner::feed::job::PlannedSection;
-use planner::feed::pack::{AxisScale, PackError, Packed, pack};
+use planner::feed::pack::{PackError, Packed, Target, pack};
 use planner::geometry::sections::{PathSettings, SectionError, sections};
 use planner::job::gcode::{Counters, Options, Program, ProgramError};
 use planner::job::machine::{LimitSet, Machine};
@@ -23,7 +23,7 @@ pub fn packed(
     tick_ns: u32,
     machine: &Machine,
 ) -> Result<Packed, PackError> {
-    pack(&section.table, number as u32, tick_ns, &AxisScale::all(&machine.axes, &section.limits))
+    pack(&section.table, number as u32, &Target::of(machine, tick_ns, &section.limits))
 }
 
 /// Why a program has no plan.

@@ -94,7 +94,7 @@ pub fn judge(chain: &Chain, machine: &Machine, per_span: usize, longest_s: f64) 
         }
         (figures.proven, figures.sampled) =
             (largest(figures.proven, proven), largest(figures.sampled, sampled));
-        match pack(&section.table, k as u32, header.tick_ns, &header.scales(&section.limits)) {
+        match pack(&section.table, k as u32, &header.target(&section.limits)) {
             Ok(packed) => figures.bytes += packed.bytes(),
             Err(e) => return found("pack", format!("section {k}, line {line}: {e}")),
         }

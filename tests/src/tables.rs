@@ -1,9 +1,9 @@
 //! Random feed tables inside the format's rules, and an f64 oracle of the motion they stand for.
 
-use planner::feed::pack::{AxisScale, Packed, pack};
+use planner::feed::pack::{AxisScale, Packed, Target, pack};
 use planner::feed::table::{FeedTable, SpanLaw};
 use planner::geometry::grid_path::{GridAxis, GridPath};
-use planner::job::machine::AxisLimits;
+use planner::job::machine::{AxisLimits, OverrideRule};
 
 /// Control tick of the random tables [ns].
 pub const TICK_NS: u32 = 1_000_000;
@@ -79,7 +79,8 @@ impl Sample {
 
     /// The table's bytes.
     pub fn packed(&self, number: u32) -> Result<Packed, planner::feed::pack::PackError> {
-        pack(&self.table, number, TICK_NS, &self.scales)
+        let axes = self.scales.clone();
+        pack(&self.table, number, &Target { tick_ns: TICK_NS, override_rule: OverrideRule::default(), axes })
     }
 
     fn candidate(random: &mut Random, kind: Kind) -> Self {

@@ -1,30 +1,33 @@
 //! Drives behind frames: tables arrive, are refused by name, start together and end at rest.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+use firmware_core::axis::AxisConfig;
 use firmware_core::drive::{Drive, DriveConfig};
 use firmware_core::evaluate::{Cursor, Setpoint};
-use firmware_core::player::AxisConfig;
 use firmware_core::table::TableView;
 use planner::feed::messages::frames;
 use planner::feed::pack::Packed;
 use planner::feed::table::FeedTable;
 use protocol::bus::{Frame, FrameSize, Node, Reassembler, ids};
-use protocol::message::{DriveMessage, HostMessage, Part, Reject, State, decode, encode};
+use protocol::message::{DriveMessage, HEADER_BYTES, HostMessage, Part, Reject, State, decode, encode};
+use protocol::power::PowerEvent;
 use protocol::table::{HeaderField, Limits, TableError, TableHeader};
 use tests::tables::{COARSE, Kind, Random, Sample, TICK_NS};
 
 const LIMITS: Limits = Limits { velocity: 1e9, acceleration: 1e12, jerk: None };
 
 fn config(axis: usize, position: i64) -> DriveConfig {
-    let axis_config = AxisConfig {
-        axis: axis as u8,
-        tick_ns: TICK_NS,
-        position,
-        limits: LIMITS,
-        travel: None,
-        status_ticks: 0,
-    };
+    let axis_config = AxisConfig { position, ..AxisConfig::new(axis as u8, TICK_NS, LIMITS) };
     DriveConfig { node: node(axis), frames: FrameSize::Classic, axis: axis_config }
+}
+
+/// A drive under torque.
+fn enabled<'a>(config: DriveConfig, a: &'a mut [u8], b: &'a mut [u8]) -> Drive<'a> {
+    let mut drive = Drive::new(config, a, b);
+    for event in [PowerEvent::Shutdown, PowerEvent::EnableOperation] {
+        send(&mut drive, config.node.to_drive(), &HostMessage::Power(event));
+    }
+    drive
 }
 
 fn node(axis: usize) -> Node {
@@ -103,7 +106,7 @@ fn axes_start_together_and_end_at_rest_on_the_exact_count() {
                 .enumerate()
                 .map(|(axis, [a, b])| {
                     let config = config(axis, packed.axes[axis].header.start);
-                    Drive::new(config, a, b)
+                    enabled(config, a, b)
                 })
                 .collect();
             for (axis, drive) in drives.iter_mut().enumerate() {
@@ -148,7 +151,7 @@ fn the_next_table_comes_in_while_one_plays_and_follows_without_a_gap() {
     let back = reversed(&there).packed(2).unwrap();
     let expected = (evaluated(&packed, 0), evaluated(&back, 0));
     let (mut a, mut b) = ([0; 4096], [0; 4096]);
-    let mut drive = Drive::new(config(0, start_of(&packed)), &mut a, &mut b);
+    let mut drive = enabled(config(0, start_of(&packed)), &mut a, &mut b);
     table_frames(&packed, 0, FrameSize::Classic).iter().for_each(|frame| drive.receive(frame));
     send(&mut drive, ids::BROADCAST, &HostMessage::Start { table: 1, tick: 0 });
     assert!(is_ready(&mut drive, 1));
@@ -183,7 +186,7 @@ fn one_lost_frame_anywhere_means_no_motion_until_it_is_sent_again() {
     let all = table_frames(&packed, 0, FrameSize::Fd);
     for lost in 0..all.len() {
         let (mut a, mut b) = ([0; 4096], [0; 4096]);
-        let mut drive = Drive::new(config(0, start_of(&packed)), &mut a, &mut b);
+        let mut drive = enabled(config(0, start_of(&packed)), &mut a, &mut b);
         all.iter().enumerate().filter(|(i, _)| *i != lost).for_each(|(_, frame)| drive.receive(frame));
         assert!(!is_ready(&mut drive, 1), "frame {lost}");
         send(&mut drive, ids::BROADCAST, &HostMessage::Start { table: 1, tick: 1 });
@@ -198,7 +201,7 @@ fn one_lost_frame_anywhere_means_no_motion_until_it_is_sent_again() {
 fn doubled_messages_change_nothing() {
     let (_, packed) = sample(34);
     let (mut a, mut b) = ([0; 4096], [0; 4096]);
-    let mut drive = Drive::new(config(0, start_of(&packed)), &mut a, &mut b);
+    let mut drive = enabled(config(0, start_of(&packed)), &mut a, &mut b);
     let mut messages: Vec<_> = packed.shared_messages().map(|m| (ids::BROADCAST, m)).collect();
     messages.extend(packed.axis_messages(0).map(|m| (node(0).to_drive(), m)));
     for (id, message) in &messages {
@@ -218,10 +221,11 @@ fn tables_that_do_not_fit_are_refused_by_name() {
     let start = start_of(&packed);
     let refuse = |config: DriveConfig, packed: &Packed, room: usize| {
         let (mut a, mut b) = (vec![0; room], vec![0; room]);
-        let mut drive = Drive::new(config, &mut a, &mut b);
+        let mut drive = enabled(config, &mut a, &mut b);
         table_frames(packed, 0, FrameSize::Classic).iter().for_each(|frame| drive.receive(frame));
-        let reason = reason(&mut drive);
+        let refused = reason(&mut drive);
         send(&mut drive, ids::BROADCAST, &HostMessage::Start { table: 1, tick: 0 });
+        let reason = refused.or_else(|| reason(&mut drive));
         let ready = drive.status().state == State::Armed;
         assert_eq!(ready, reason.is_none());
         if !ready {
@@ -261,7 +265,7 @@ fn tables_that_do_not_fit_are_refused_by_name() {
 fn starts_are_refused_by_name() {
     let (_, packed) = sample(41);
     let (mut a, mut b) = ([0; 4096], [0; 4096]);
-    let mut drive = Drive::new(config(0, start_of(&packed)), &mut a, &mut b);
+    let mut drive = enabled(config(0, start_of(&packed)), &mut a, &mut b);
     let start = |drive: &mut Drive<'_>, table, tick| {
         send(drive, ids::BROADCAST, &HostMessage::Start { table, tick });
         reason(drive)
@@ -288,7 +292,7 @@ fn a_running_table_survives_stop_and_every_message_about_others() {
     let (_, packed) = sample(42);
     let expected = evaluated(&packed, 0);
     let (mut a, mut b) = ([0; 4096], [0; 4096]);
-    let mut drive = Drive::new(config(0, start_of(&packed)), &mut a, &mut b);
+    let mut drive = enabled(config(0, start_of(&packed)), &mut a, &mut b);
     table_frames(&packed, 0, FrameSize::Classic).iter().for_each(|frame| drive.receive(frame));
     send(&mut drive, ids::BROADCAST, &HostMessage::Start { table: 1, tick: 0 });
     let open = |table| HostMessage::Open(TableHeader { table, ..packed.header });
@@ -311,7 +315,7 @@ fn status_comes_at_its_period() {
     let (mut a, mut b) = ([0; 4096], [0; 4096]);
     let mut config = config(0, start_of(&packed));
     config.axis.status_ticks = 20;
-    let mut drive = Drive::new(config, &mut a, &mut b);
+    let mut drive = enabled(config, &mut a, &mut b);
     let statuses: Vec<_> = (0..100)
         .flat_map(|_| {
             drive.tick();
@@ -325,7 +329,7 @@ fn status_comes_at_its_period() {
 
 /// A header with one bit of its bytes changed, if that is a header.
 fn mutated(header: &TableHeader, random: &mut Random) -> Option<TableHeader> {
-    let mut buffer = [0; 64];
+    let mut buffer = [0; HEADER_BYTES];
     let mut bytes = encode(header, &mut buffer).unwrap().to_vec();
     let at = random.whole(0, bytes.len() as u64 - 1) as usize;
     bytes[at] ^= 1 << random.whole(0, 7);

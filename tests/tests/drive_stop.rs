@@ -1,11 +1,13 @@
 //! A quick stop at any instant of any table, and faults on the way: the axis comes to rest within its limits.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests fail as tests do")]
 
+use firmware_core::axis::AxisConfig;
 use firmware_core::evaluate::{Cursor, Setpoint};
-use firmware_core::player::{AxisConfig, Player};
+use firmware_core::player::Player;
 use firmware_core::table::TableView;
 use planner::feed::pack::Packed;
 use protocol::message::{DriveMessage, HostMessage, Part, Reject, State};
+use protocol::power::PowerEvent;
 use protocol::table::Limits;
 use tests::tables::{COARSE, FINE, Random, Sample, TICK_NS};
 
@@ -58,15 +60,11 @@ fn bring(player: &mut Player<'_>, packed: &Packed) -> bool {
 }
 
 fn player<'a>(packed: &Packed, limits: Limits, a: &'a mut [u8], b: &'a mut [u8]) -> Player<'a> {
-    let config = AxisConfig {
-        axis: 0,
-        tick_ns: TICK_NS,
-        position: packed.axes[0].header.start,
-        limits,
-        travel: None,
-        status_ticks: 0,
-    };
-    Player::new(config, a, b)
+    let config = AxisConfig { position: packed.axes[0].header.start, ..AxisConfig::new(0, TICK_NS, limits) };
+    let mut player = Player::new(config, a, b);
+    player.handle(&HostMessage::Power(PowerEvent::Shutdown));
+    player.handle(&HostMessage::Power(PowerEvent::EnableOperation));
+    player
 }
 
 /// The set-points after a quick stop keep limits and follow each other; returns where they end.

@@ -120,7 +120,7 @@ fn tables_are_small() {
     for Case { name, machine, chain, .. } in cases() {
         let header = FileHeader::from(machine);
         let packed = chain.plan.sections().zip(0..).map(|(section, number)| {
-            pack(&section.table, number, header.tick_ns, &header.scales(&section.limits)).unwrap().bytes()
+            pack(&section.table, number, &header.target(&section.limits)).unwrap().bytes()
         });
         let mut bytes = planner::feed::pack::TableBytes::default();
         packed.for_each(|one| bytes += one);

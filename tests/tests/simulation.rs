@@ -13,7 +13,7 @@ use planner::feed::table::FeedTable;
 use planner::geometry::grid_path::{GridAxis, GridPath};
 use planner::geometry::section::{Deviation, Marks};
 use planner::job::machine::{
-    Axis, AxisKind, AxisLimits, CornerMode, MAX_AXES, Machine, Plant, Servo, TwoMass, Unit,
+    Axis, AxisKind, AxisLimits, CornerMode, MAX_AXES, Machine, OverrideRule, Plant, Servo, TwoMass, Unit,
 };
 use planner::job::program::{MoveKind, StopCause};
 
@@ -32,6 +32,7 @@ fn axis(name: &str, unit: Unit) -> Axis {
         travel: [-1000.0, 1000.0],
         limits,
         rapid: limits,
+        headroom: [1.0; 3],
         plant: Plant {
             inertia: if unit == Unit::Mm { 30.0 } else { 0.5 },
             viscous: if unit == Unit::Mm { 40.0 } else { 0.1 },
@@ -63,6 +64,7 @@ fn machine() -> Machine {
         home: [0.0; MAX_AXES],
         second_home: [0.0; MAX_AXES],
         tools: Vec::new(),
+        override_rule: OverrideRule::default(),
     }
 }
 

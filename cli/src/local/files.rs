@@ -116,13 +116,8 @@ pub(super) fn inspect(path: &Path) -> Result<InspectJson, Failure> {
     for item in &file.items {
         match item {
             JobItem::Section(section) => {
-                let packed = pack(
-                    &section.table,
-                    number,
-                    file.header.tick_ns,
-                    &file.header.scales(&section.limits),
-                )
-                .map_err(|e| Failure::internal(format!("table {number} cannot be packed again: {e}")))?;
+                let packed = pack(&section.table, number, &file.header.target(&section.limits))
+                    .map_err(|e| Failure::internal(format!("table {number} cannot be packed again: {e}")))?;
                 told.motion_time_s += section.table.duration();
                 told.shared_bytes += packed.bytes().shared;
                 for (axis, part) in told.axes.iter_mut().zip(&packed.axes) {

@@ -102,9 +102,8 @@ fn table_size(fitted: &Fitted) -> Result<model::TableSize, Failure> {
         headers: 0,
     };
     for section in fitted.plan.sections() {
-        let packed =
-            pack(&section.table, size.sections as u32, header.tick_ns, &header.scales(&section.limits))
-                .map_err(|e| Failure::internal(format!("the feed table cannot be packed: {e}")))?;
+        let packed = pack(&section.table, size.sections as u32, &header.target(&section.limits))
+            .map_err(|e| Failure::internal(format!("the feed table cannot be packed: {e}")))?;
         let TableBytes { spans, geometry_spans, shared, headers, .. } = packed.bytes();
         size.sections += 1;
         size.spans += spans;

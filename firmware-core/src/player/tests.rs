@@ -1,14 +1,14 @@
 use super::*;
 use crate::guard::Guard;
 use protocol::message::{Fault, Reject, State};
-use protocol::power::{Power, PowerEvent};
-use protocol::table::warp::{ONE, RATE_ONE, Warp};
-use protocol::table::{AxisLimit, Limits, TableHeader};
 use protocol::message::{Part, part_crc};
+use protocol::power::{Power, PowerEvent};
 use protocol::table::control::ControlWriter;
 use protocol::table::geometry::{self, GeometrySpan};
 use protocol::table::span::SpanWriter;
+use protocol::table::warp::{ONE, RATE_ONE, Warp};
 use protocol::table::{AxisHeader, FORMAT_VERSION, Stream, TableError};
+use protocol::table::{AxisLimit, Limits, TableHeader};
 
 extern crate std;
 use std::vec::Vec;

@@ -1,6 +1,6 @@
-use protocol::table::rules::USUAL_MARGIN;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use protocol::table::rules::USUAL_MARGIN;
 
 use super::*;
 

@@ -72,6 +72,7 @@ pub(crate) fn axis(kind: AxisKind, limits: AxisLimits) -> Axis {
         travel: [-1.0, 11.0],
         limits,
         rapid: limits,
+        headroom: [1.0; 3],
         plant,
         servo,
     }

@@ -24,8 +24,8 @@ pub use reader::FeedReader;
 pub use writer::{FeedWriter, PendingFile};
 
 use super::job::JobItem;
-use super::pack::AxisScale;
-use crate::job::machine::{Axis, AxisKind, AxisLimits, Machine, Unit};
+use super::pack::{AxisScale, Target};
+use crate::job::machine::{Axis, AxisKind, AxisLimits, Machine, OverrideRule, Unit};
 
 const MAGIC: [u8; 8] = *b"FEEDSPLN";
 
@@ -34,7 +34,8 @@ pub const FILE_VERSION: u16 = 1;
 
 /// All records in their order in the file; whoever changes one of them changes this text.
 const SCHEMA: &str = "\
-FileHeader{name str,tick_ns u32,axes [FileAxis]}\
+FileHeader{name str,tick_ns u32,axes [FileAxis],override_rule OverrideRule}\
+OverrideRule{most f64,acceleration f64,jerk f64}\
 FileAxis{name str,kind[Linear,Rotary],unit[Mm,Deg,Rad],counts_per_unit f64,travel [f64;2],limits AxisLimits,\
 rapid AxisLimits,tolerance_scale f64}AxisLimits{velocity f64,acceleration f64,jerk f64}\
 Item[Section{kind[Rapid,Feed],limits [AxisLimits],lsbs [f64],header TableHeader,shared [u8],\
@@ -57,6 +58,8 @@ pub struct FileHeader {
     pub tick_ns: u32,
     /// The axes, in the machine's order.
     pub axes: Vec<FileAxis>,
+    /// What overrides and holds may do.
+    pub override_rule: OverrideRule,
 }
 
 /// One axis.
@@ -127,6 +130,7 @@ impl From<&Machine> for FileHeader {
             name: machine.name.clone(),
             tick_ns: (machine.control_tick_s * 1e9).round() as u32,
             axes: machine.axes.iter().map(|axis| with_tolerance(axis, machine)).collect(),
+            override_rule: machine.override_rule,
         }
     }
 }
@@ -141,12 +145,16 @@ fn with_tolerance(axis: &Axis, machine: &Machine) -> FileAxis {
 }
 
 impl FileHeader {
-    /// What packing a table with these limits needs, one per axis; short if `limits` is.
-    pub fn scales(&self, limits: &[AxisLimits]) -> Vec<AxisScale> {
+    /// What packing a table with these limits needs; short if `limits` is.
+    pub fn target(&self, limits: &[AxisLimits]) -> Target {
         let pairs = self.axes.iter().zip(limits);
-        pairs
-            .map(|(axis, limits)| AxisScale { counts_per_unit: axis.counts_per_unit, limits: *limits })
-            .collect()
+        Target {
+            tick_ns: self.tick_ns,
+            override_rule: self.override_rule.of_plans(),
+            axes: pairs
+                .map(|(axis, limits)| AxisScale { counts_per_unit: axis.counts_per_unit, limits: *limits })
+                .collect(),
+        }
     }
 }
 

@@ -3,5 +3,6 @@
 pub mod file;
 pub mod job;
 pub mod messages;
+pub mod override_bounds;
 pub mod pack;
 pub mod table;

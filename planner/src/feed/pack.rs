@@ -8,9 +8,10 @@ use protocol::table::span::{SpanReader, SpanWriter};
 use protocol::table::{AxisHeader, FORMAT_VERSION, Limits, Stream, TableError, TableHeader};
 use thiserror::Error;
 
+use super::override_bounds::warp;
 use super::table::{FeedTable, MIN_SPANS, SpanLaw};
 use crate::geometry::grid_path::{GridAxis, GridPath};
-use crate::job::machine::{Axis, AxisLimits};
+use crate::job::machine::{Axis, AxisLimits, Machine, OverrideRule};
 use crate::tolerances::{FORMAT_MARGIN, LSB_RATIO};
 
 /// What packing needs to know of one axis besides its control points.
@@ -22,14 +23,26 @@ pub struct AxisScale {
     pub limits: AxisLimits,
 }
 
-impl AxisScale {
-    /// One per axis of a machine, for a table that was planned for `limits`.
-    pub fn all(axes: &[Axis], limits: &[AxisLimits]) -> Vec<Self> {
-        let scale = |(axis, limits): (&Axis, &AxisLimits)| Self {
+/// What a table is packed for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Target {
+    /// The drives' control tick [ns].
+    pub tick_ns: u32,
+    /// What overrides may do, against the limits that the table was planned for.
+    pub override_rule: OverrideRule,
+    /// One entry per axis of the path.
+    pub axes: Vec<AxisScale>,
+}
+
+impl Target {
+    /// The drives of a machine, for a table that was planned for `limits`.
+    pub fn of(machine: &Machine, tick_ns: u32, limits: &[AxisLimits]) -> Self {
+        let scale = |(axis, limits): (&Axis, &AxisLimits)| AxisScale {
             counts_per_unit: axis.counts_per_unit,
             limits: *limits,
         };
-        axes.iter().zip(limits).map(scale).collect()
+        let axes = machine.axes.iter().zip(limits).map(scale).collect();
+        Self { tick_ns, override_rule: machine.override_rule.of_plans(), axes }
     }
 }
 
@@ -109,17 +122,22 @@ pub enum PackError {
     },
 }
 
-/// Packs a table for drives with a control tick of `tick_ns`; `scales` has one entry per axis of the path.
+/// Packs a table.
 ///
 /// # Errors
 /// What the format cannot express or a drive would refuse.
-pub fn pack(table: &FeedTable, number: u32, tick_ns: u32, scales: &[AxisScale]) -> Result<Packed, PackError> {
-    check_shape(table, scales.len())?;
+pub fn pack(table: &FeedTable, number: u32, target: &Target) -> Result<Packed, PackError> {
+    let tick_ns = target.tick_ns;
+    check_shape(table, target.axes.len())?;
     check_times(table, tick_ns)?;
     let mut shared = Vec::new();
     write_geometry(table, &mut shared)?;
     let geometry_bytes = shared.len() as u32;
     write_spans(table, &mut shared);
+    let axes = table.path.axes.iter().zip(&target.axes).enumerate();
+    let axes: Vec<PackedAxis> =
+        axes.map(|(i, (axis, scale))| pack_axis(i, number, axis, scale)).collect::<Result<_, _>>()?;
+    let limits: Vec<Limits> = axes.iter().map(|axis| axis.header.limits).collect();
     let header = TableHeader {
         version: FORMAT_VERSION,
         table: number,
@@ -130,10 +148,10 @@ pub fn pack(table: &FeedTable, number: u32, tick_ns: u32, scales: &[AxisScale]) 
         tick_ns,
         geometry_bytes,
         span_bytes: shared.len() as u32 - geometry_bytes,
+        margin: rules::USUAL_MARGIN,
+        warp: warp(&target.override_rule, &limits, tick_ns),
     };
     header.check().map_err(PackError::Rule)?;
-    let axes = table.path.axes.iter().zip(scales).enumerate();
-    let axes = axes.map(|(i, (axis, scale))| pack_axis(i, number, axis, scale)).collect::<Result<_, _>>()?;
     Ok(Packed { header, shared, axes })
 }
 

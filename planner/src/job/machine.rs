@@ -35,6 +35,50 @@ pub struct Machine {
     pub second_home: Point,
     /// Tool lengths by tool number, for G43 H [mm].
     pub tools: Vec<Tool>,
+    /// What overrides and holds may do.
+    pub override_rule: OverrideRule,
+}
+
+/// How far an override may hurry the axes, and how far overrides and holds may exceed the limits of the axes while they
+/// change the rate.
+///
+/// Slowing down costs acceleration and jerk beyond those of the path. Where the limits do not grant it, plans leave room:
+/// they are made with limits that are lower by [`OverrideRule::headroom`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OverrideRule {
+    /// Largest override; 1 is 100 %.
+    pub most: f64,
+    /// Acceleration may become so many times the limit.
+    pub acceleration: f64,
+    /// And jerk.
+    pub jerk: f64,
+}
+
+impl Default for OverrideRule {
+    fn default() -> Self {
+        Self { most: 1.0, acceleration: 1.2, jerk: 1.3 }
+    }
+}
+
+impl OverrideRule {
+    /// What acceleration and jerk need beyond those of the largest rate, so that slowing down is brisk.
+    const ROOM: [f64; 2] = [0.2, 0.3];
+
+    /// Limits of plans are those of the axes over these: velocity, acceleration, jerk.
+    pub fn headroom(&self) -> [f64; 3] {
+        let [acceleration, jerk] = Self::ROOM;
+        [
+            self.most,
+            ((self.most.powi(2) + acceleration) / self.acceleration).max(1.0),
+            ((self.most.powi(3) + jerk) / self.jerk).max(1.0),
+        ]
+    }
+
+    /// The same rule against the limits of plans.
+    pub fn of_plans(&self) -> Self {
+        let [_, acceleration, jerk] = self.headroom();
+        Self { most: self.most, acceleration: self.acceleration * acceleration, jerk: self.jerk * jerk }
+    }
 }
 
 /// One row of the tool table.
@@ -74,6 +118,8 @@ pub struct Axis {
     pub limits: AxisLimits,
     /// Limits of rapid moves.
     pub rapid: AxisLimits,
+    /// What plans leave to overrides: limits over these, velocity, acceleration, jerk ([`OverrideRule::headroom`]).
+    pub headroom: [f64; 3],
     /// The mechanics behind the drive.
     pub plant: Plant,
     /// The drive's controller.
@@ -122,11 +168,17 @@ pub enum LimitSet {
 }
 
 impl LimitSet {
-    /// The limits of `axis` that count for moves of `kind`.
+    /// The limits of `axis` that count for plans of moves of `kind`.
     pub fn of(self, axis: &Axis, kind: MoveKind) -> AxisLimits {
         let limits = match kind {
             MoveKind::Rapid => axis.rapid,
             MoveKind::Feed => axis.limits,
+        };
+        let [v, a, j] = axis.headroom;
+        let limits = AxisLimits {
+            velocity: limits.velocity / v,
+            acceleration: limits.acceleration / a,
+            jerk: limits.jerk / j,
         };
         match self {
             LimitSet::VelocityAcceleration => AxisLimits { jerk: f64::INFINITY, ..limits },

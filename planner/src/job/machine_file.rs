@@ -11,6 +11,7 @@
 //! | `corner` | `blend` |
 //! | `tolerance_mm`, `best_speed_mm`, `exact_path_mm` | 0.01, 0.05, 0.001 |
 //! | `tolerance_rotary` | 0.01 deg, in the unit of the rotary axes |
+//! | `override.most`, `override.acceleration`, `override.jerk` | 1, 1.2, 1.3 |
 //! | `home`, `second_home` | 0 on every axis not named |
 //! | `rapid` | the limits of feed moves |
 //! | `mass_kg`, `inertia_kg_m2` | 50, 0.05 |
@@ -33,7 +34,8 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::machine::{
-    Axis, AxisKind, AxisLimits, CornerMode, MAX_AXES, Machine, Plant, Point, Servo, Tool, TwoMass, Unit,
+    Axis, AxisKind, AxisLimits, CornerMode, MAX_AXES, Machine, OverrideRule, Plant, Point, Servo, Tool,
+    TwoMass, Unit,
 };
 use super::machine_error::{MachineError, MachineErrorKind as Kind};
 
@@ -68,6 +70,16 @@ struct MachineForm {
     second_home: BTreeMap<Spanned<String>, Value>,
     #[serde(default)]
     tool: Vec<ToolForm>,
+    #[serde(default, rename = "override")]
+    override_rule: OverrideForm,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OverrideForm {
+    most: Option<Value>,
+    acceleration: Option<Value>,
+    jerk: Option<Value>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -206,9 +218,10 @@ impl MachineForm {
                 return Err((span, Kind::TooManyAxes { count, most: MAX_AXES }));
             }
         }
+        let override_rule = self.override_rule.checked()?;
         let mut axes: Vec<Axis> = Vec::with_capacity(self.axis.len());
         for form in &self.axis {
-            let axis = form.get_ref().checked(tick_s)?;
+            let axis = form.get_ref().checked(tick_s, override_rule.headroom())?;
             if axes.iter().any(|other| other.name == axis.name) {
                 return Err((form.get_ref().name.span(), Kind::AxisTwice { name: axis.name }));
             }
@@ -251,12 +264,13 @@ impl MachineForm {
             second_home: stored_position(&self.second_home, "second_home", &axes)?,
             axes,
             tools,
+            override_rule,
         })
     }
 }
 
 impl AxisForm {
-    fn checked(&self, tick_s: f64) -> Checked<Axis> {
+    fn checked(&self, tick_s: f64, headroom: [f64; 3]) -> Checked<Axis> {
         let name = self.name.get_ref().to_ascii_uppercase();
         let tail_ok = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         let usable = name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(tail_ok);
@@ -304,7 +318,23 @@ impl AxisForm {
         };
         let plant = self.plant.checked(kind, counts_per_unit, &fastest)?;
         let servo = self.servo.checked(tick_s)?;
-        Ok(Axis { name, kind, unit, counts_per_unit, travel, limits, rapid, plant, servo })
+        Ok(Axis { name, kind, unit, counts_per_unit, travel, limits, rapid, headroom, plant, servo })
+    }
+}
+
+impl OverrideForm {
+    fn checked(&self) -> Checked<OverrideRule> {
+        let usual = OverrideRule::default();
+        let factor = |value: &Option<Value>, key, default, most, expected| match value {
+            Some(v) => within(v, key, 1.0, most, expected),
+            None => Ok(default),
+        };
+        let few = "a factor from 1 to 4";
+        Ok(OverrideRule {
+            most: factor(&self.most, "override.most", usual.most, 1.5, "a rate from 1 to 1.5")?,
+            acceleration: factor(&self.acceleration, "override.acceleration", usual.acceleration, 4.0, few)?,
+            jerk: factor(&self.jerk, "override.jerk", usual.jerk, 4.0, few)?,
+        })
     }
 }
 

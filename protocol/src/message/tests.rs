@@ -43,7 +43,10 @@ fn host_messages_are_pinned() {
     let data = HostMessage::Data { table: 300, part: Part::Axis, offset: 5, bytes: &[7, 8] };
     let seal = HostMessage::Seal { table: 1, part: Part::Shared, crc: 0x80 };
     let cases: [(HostMessage<'_>, &[u8]); 15] = [
-        (HostMessage::Open(HEADER), &[0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10, 5, 0]),
+        (
+            HostMessage::Open(HEADER),
+            &[0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10, 5, 0],
+        ),
         (
             HostMessage::OpenAxis(AXIS),
             &[1, 0xac, 2, 2, 4, 1, 0x80, 1, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x40, 1, 0, 0, 0x80, 0x40, 9],
@@ -60,9 +63,10 @@ fn host_messages_are_pinned() {
         (HostMessage::Power(PowerEvent::EnableOperation), &[10, 2]),
         (HostMessage::Override { permille: 500, tick: 7 }, &[11, 0xf4, 3, 7]),
         (HostMessage::Alive, &[12]),
-        (HostMessage::Open(TableHeader { warp: Some(WARP), ..HEADER }), &[
-            0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10, 5, 1, 1, 2, 3, 4, 5,
-        ]),
+        (
+            HostMessage::Open(TableHeader { warp: Some(WARP), ..HEADER }),
+            &[0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10, 5, 1, 1, 2, 3, 4, 5],
+        ),
     ];
     for (message, golden) in cases {
         assert_eq!(bytes(&message), golden, "{message:?}");

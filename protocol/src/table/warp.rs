@@ -65,8 +65,7 @@ impl Warp {
     pub fn suits(&self, limits: &Limits, tick_ns: u32) -> bool {
         let one = ONE as f32;
         let tick_s = tick_ns as f32 * 1e-9;
-        let (top, k, k_j) =
-            (self.rate as f32 / one, self.acceleration as f32 / one, self.jerk as f32 / one);
+        let (top, k, k_j) = (self.rate as f32 / one, self.acceleration as f32 / one, self.jerk as f32 / one);
         let slope = self.slope as f32 / (1u64 << 40) as f32 / tick_s;
         let bend = self.bend as f32 / RATE_ONE as f32 / tick_s / tick_s;
         let Limits { velocity: v, acceleration: a, jerk } = *limits;
@@ -78,9 +77,8 @@ impl Warp {
         let turn = -linear / (3.0 * cubic);
         // At s^2 = turn it is s (2/3) linear; squares spare the root.
         let rest = k_j * ROUNDING - v * bend / j;
-        let between = cubic >= 0.0
-            || turn >= top * top
-            || turn * linear * linear * (4.0 / 9.0) <= rest * rest;
+        let between =
+            cubic >= 0.0 || turn >= top * top || turn * linear * linear * (4.0 / 9.0) <= rest * rest;
         v * slope <= a * ROUNDING && rest >= 0.0 && at_top <= rest && between
     }
 }

@@ -9,7 +9,7 @@ use super::record::{Item, are_limits};
 use super::{FILE_VERSION, FeedFile, FileHeader, MAGIC, ReadError, SCHEMA_HASH, Totals};
 use crate::feed::job::JobItem;
 use crate::feed::pack::TableBytes;
-use crate::job::machine::MAX_AXES;
+use crate::job::machine::{MAX_AXES, OverrideRule};
 
 /// Longest payload of a record [bytes].
 pub(super) const MAX_RECORD: u32 = 256 << 20;
@@ -53,7 +53,12 @@ impl<R: Read> FeedReader<R> {
         if found != SCHEMA_HASH {
             return Err(ReadError::Schema { found, expected: SCHEMA_HASH });
         }
-        let header = FileHeader { name: String::new(), tick_ns: 0, axes: vec![] };
+        let header = FileHeader {
+            name: String::new(),
+            tick_ns: 0,
+            axes: vec![],
+            override_rule: OverrideRule::default(),
+        };
         let (counted, payload) = (Totals::default(), Vec::new());
         let mut reader = Self { source, header, record: 0, counted, totals: None, payload };
         reader.header = match reader.next_record()? {

@@ -104,7 +104,7 @@ impl Section {
         if section.limits.len() != header.axes.len() || !section.limits.iter().all(are_limits) {
             return Err(refuse("limits"));
         }
-        let packed = pack(&section.table, number, header.tick_ns, &header.scales(&section.limits))
+        let packed = pack(&section.table, number, &header.target(&section.limits))
             .map_err(|error| WriteError::Table { item, error })?;
         let bytes = packed.bytes();
         let length = section.table.path.grid_length();
@@ -145,7 +145,7 @@ impl Section {
         let packed = Packed { header: self.header, shared: self.shared, axes };
         let table = unpack(&packed, &self.lsbs).map_err(wrong)?;
         // Headers repeat what the table and the machine say; packing again finds every contradiction.
-        let again = pack(&table, number, header.tick_ns, &header.scales(&self.limits)).map_err(wrong)?;
+        let again = pack(&table, number, &header.target(&self.limits)).map_err(wrong)?;
         if again != packed {
             return Err(refuse("table headers"));
         }

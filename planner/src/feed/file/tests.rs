@@ -17,7 +17,12 @@ fn header() -> FileHeader {
         rapid: AxisLimits { jerk: 1e5, ..limits },
         tolerance_scale: 1.0,
     };
-    FileHeader { name: "mill".into(), tick_ns: 1_000_000, axes: vec![axis("X"), axis("Y")] }
+    FileHeader {
+        name: "mill".into(),
+        tick_ns: 1_000_000,
+        axes: vec![axis("X"), axis("Y")],
+        override_rule: OverrideRule::default(),
+    }
 }
 
 fn section() -> PlannedSection {

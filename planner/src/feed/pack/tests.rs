@@ -19,13 +19,18 @@ pub(crate) fn sample(bumps: &[i64; 6], codes: [u32; 7]) -> FeedTable {
 
 pub(crate) const CODES: [u32; 7] = [9000, 14_000, 17_000, 16_000, 14_000, 11_000, 8000];
 
+/// For drives of 1 kHz.
+pub(crate) fn target() -> Target {
+    Target { tick_ns: 1_000_000, override_rule: OverrideRule::default(), axes: scales() }
+}
+
 pub(crate) fn scales() -> Vec<AxisScale> {
     let limits = AxisLimits { velocity: 100.0, acceleration: 1000.0, jerk: f64::INFINITY };
     vec![AxisScale { counts_per_unit: 1000.0, limits }; 2]
 }
 
 fn packed() -> Packed {
-    pack(&sample(&[0; 6], CODES), 7, 1_000_000, &scales()).unwrap()
+    pack(&sample(&[0; 6], CODES), 7, &target()).unwrap()
 }
 
 #[test]
@@ -56,7 +61,7 @@ fn what_the_format_cannot_express_is_refused_by_name() {
     let refuse = |change: &dyn Fn(&mut FeedTable)| {
         let mut table = good.clone();
         change(&mut table);
-        pack(&table, 0, 1_000_000, &scales()).unwrap_err()
+        pack(&table, 0, &target()).unwrap_err()
     };
     let rule = |error| PackError::Rule(error);
     let axis = |error| PackError::AxisRule { axis: 0, error };
@@ -81,7 +86,7 @@ fn what_the_format_cannot_express_is_refused_by_name() {
     assert_eq!(refuse(&|t| t.path.axes[0].controls[0] = i64::MIN), axis(range));
     let mut limits = scales();
     limits[1].limits.velocity = f64::NAN;
-    assert_eq!(pack(&good, 0, 1_000_000, &limits), Err(PackError::Limits { axis: 1 }));
+    assert_eq!(pack(&good, 0, &Target { axes: limits, ..target() }), Err(PackError::Limits { axis: 1 }));
 }
 
 #[test]
@@ -114,7 +119,7 @@ proptest! {
         number in any::<u32>(),
     ) {
         let table = sample(&bumps, std::array::from_fn(|i| CODES[i] + codes[i]));
-        let packed = pack(&table, number, 1_000_000, &scales()).unwrap();
+        let packed = pack(&table, number, &target()).unwrap();
         let lsbs: Vec<f64> = table.path.axes.iter().map(|axis| axis.lsb).collect();
         prop_assert_eq!(unpack(&packed, &lsbs), Ok(table));
     }

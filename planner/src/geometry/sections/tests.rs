@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::geometry::grid_path::GridPath;
 use crate::geometry::section::SpeedCap;
-use crate::job::machine::{Axis, AxisKind, CornerMode, Plant, Servo, Unit};
+use crate::job::machine::{Axis, AxisKind, CornerMode, OverrideRule, Plant, Servo, Unit};
 use crate::job::program::{Arc, Corner, Feed, Move, Shape, ToleranceSource};
 
 fn axis(name: &str, kind: AxisKind, counts_per_unit: f64) -> Axis {
@@ -20,6 +20,7 @@ fn axis(name: &str, kind: AxisKind, counts_per_unit: f64) -> Axis {
         travel: [-1e7, 1e7],
         limits,
         rapid: limits,
+        headroom: [1.0; 3],
         plant: Plant {
             inertia: 1.0,
             viscous: 0.0,
@@ -51,6 +52,7 @@ fn machine(axes: Vec<Axis>) -> Machine {
         home: [0.0; MAX_AXES],
         second_home: [0.0; MAX_AXES],
         tools: Vec::new(),
+        override_rule: OverrideRule::default(),
     }
 }
 
