@@ -115,11 +115,13 @@ impl<'a> Station<'a> {
         }
     }
 
-    /// Takes what the motion has said; what could not be ordered before is ordered now.
-    pub fn hear(&mut self, report: Option<Report<'a>>, orders: &mut dyn Orders<'a>) {
-        if let Some(report) = report {
-            self.intake.hear(report);
-        }
+    /// Takes what the motion has said.
+    pub fn hear(&mut self, report: Report<'a>) {
+        self.intake.hear(report);
+    }
+
+    /// What could not be ordered before is ordered now.
+    pub fn retry(&mut self, orders: &mut dyn Orders<'a>) {
         self.intake.retry(orders);
     }
 

@@ -8,7 +8,7 @@
 //!
 //! A drive has two halves. [`intake`] talks: messages in, tables checked, answers out. [`motion`] moves: one set-point per
 //! control tick. They share no memory and hand each other [`orders`], so that the tick never waits. [`player`] is both on the
-//! level of messages; [`drive`] puts them behind CAN frames.
+//! level of messages; [`drive`] puts them behind CAN frames; [`halves`] is what a board runs.
 #![no_std]
 
 pub mod axis;
@@ -17,6 +17,7 @@ pub mod double_s;
 pub mod drive;
 pub mod evaluate;
 mod guard;
+pub mod halves;
 pub mod intake;
 mod math;
 pub mod motion;

@@ -9,9 +9,9 @@ use protocol::power::PowerEvent;
 use crate::store::Loaded;
 
 /// Orders that may wait for the next tick.
-pub const ORDERS: usize = 8;
+pub const ORDERS: usize = 4;
 /// Reports that may wait to be sent; status is dropped first.
-pub const REPORTS: usize = 8;
+pub const REPORTS: usize = 6;
 
 /// From communication to motion.
 #[derive(Debug)]

@@ -20,6 +20,8 @@ const PROGRAM: &str = include_str!("../../jobs/cat.ngc");
 
 /// Control tick [ns]: more than a million set-points.
 const TICK_NS: u32 = 100_000;
+/// Room for one table, as on the board [bytes].
+const ROOM: usize = 64 * 1024;
 /// As many as the image plans.
 const MOVES: u32 = 100_000;
 
@@ -50,10 +52,17 @@ fn main() {
         }
     }
     fs::write(path, &tables).expect("the tables can be written");
-    let played = workload::play(&tables, |_, work| work()).expect("what the planner packs, a drive accepts");
-    let planned = workload::plan_moves(MOVES, |work| work());
-    println!("setpoints {}", played.setpoints);
-    println!("setpoint_hash {}", played.hash);
+    let run = |work: &mut dyn FnMut() -> workload::Work| {
+        work();
+    };
+    let evaluated = workload::evaluate(&tables, run).expect("what the planner packs, a drive accepts");
+    let (mut a, mut b) = (vec![0; ROOM], vec![0; ROOM]);
+    let driven = workload::drive(&tables, [&mut a, &mut b], run).expect("what a drive accepts, it plays");
+    let planned = workload::plan_moves(MOVES, run);
+    println!("setpoints {}", evaluated.setpoints);
+    println!("setpoint_hash {}", evaluated.hash);
+    println!("driven {}", driven.setpoints);
+    println!("driven_hash {}", driven.hash);
     println!("plans {}", planned.plans);
     println!("imprecise {}", planned.imprecise);
     println!("plan_hash {}", planned.hash);

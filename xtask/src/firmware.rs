@@ -30,12 +30,21 @@ const BOARD: [&str; 10] = [
 const PATIENCE_S: &str = "300";
 
 /// What host and image have to agree on.
-const SAME: [&str; 5] = ["setpoints", "setpoint_hash", "plans", "imprecise", "plan_hash"];
+const SAME: [&str; 7] =
+    ["setpoints", "setpoint_hash", "driven", "driven_hash", "plans", "imprecise", "plan_hash"];
 
 /// Most instructions that the image may report: what was measured, and a twentieth more. docs/benchmarks.md has targets.
-const MOST: [(&str, u64); 6] = [
-    ("tick_most", 1_470),
-    ("tick_mean", 208),
+const MOST: [(&str, u64); 14] = [
+    ("evaluate_most", 470),
+    ("evaluate_mean", 208),
+    ("span_most", 1_470),
+    ("span_mean", 1_000),
+    ("tick_most", 2_000),
+    ("tick_mean", 300),
+    ("tick_override_most", 2_000),
+    ("tick_override_mean", 600),
+    ("tick_fallback_most", 20_000),
+    ("tick_fallback_mean", 1_000),
     ("prove_per_span_most", 1_285),
     ("prove_per_span_mean", 1_090),
     ("plan_most", 13_570),

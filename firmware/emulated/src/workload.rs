@@ -2,11 +2,15 @@
 //!
 //! The host includes this very file; it needs nothing but the core and `protocol`.
 
+use firmware_core::axis::AxisConfig;
 use firmware_core::double_s::{Bounds, DoubleSError, MotionLimits, State, plan};
-use firmware_core::evaluate::Cursor;
+use firmware_core::evaluate::{Cursor, Setpoint};
+use firmware_core::player::Player;
 use firmware_core::table::TableView;
 use firmware_core::time::PathClock;
 use protocol::checksum::Fnv64;
+use protocol::message::{DATA_BYTES, HostMessage, Part, part_crc};
+use protocol::power::PowerEvent;
 use protocol::table::{AxisHeader, TableHeader};
 
 /// A table as the image carries it: headers as postcard, then streams, each with its length before it (u32, little-endian).
@@ -36,6 +40,25 @@ impl<'a> Iterator for Stored<'a> {
     }
 }
 
+/// Something whose cost is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Work {
+    /// The proof of a table of so many spans.
+    Proof(u32),
+    /// A set-point within a span, without what is around it.
+    Evaluate,
+    /// A set-point that begins a span.
+    Span,
+    /// A control tick: a table at rate 1.
+    Tick,
+    /// A control tick at another rate.
+    Override,
+    /// A control tick off the path, and the one that plans it.
+    Fallback,
+    /// A motion.
+    Plan,
+}
+
 /// What playing has come to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Played {
@@ -45,33 +68,123 @@ pub struct Played {
     pub hash: u64,
 }
 
-/// Proves and plays every table; `around` is put round each proof and each set-point, with the number of spans or `None`.
+/// Proves and evaluates every table, tick by tick; `around` is put round each proof and each set-point.
 ///
 /// `None`: a table is refused.
-pub fn play(bytes: &[u8], mut around: impl FnMut(Option<u32>, &mut dyn FnMut())) -> Option<Played> {
+pub fn evaluate(bytes: &[u8], mut around: impl FnMut(&mut dyn FnMut() -> Work)) -> Option<Played> {
     let (mut hash, mut setpoints) = (Fnv64::new(), 0u64);
     for [header, axis, shared, controls] in Stored::new(bytes) {
         let header: TableHeader = protocol::message::decode(header).ok()?;
         let axis: AxisHeader = protocol::message::decode(axis).ok()?;
         let view = TableView::new(&header, &axis, shared, controls).ok()?;
         let mut checked = None;
-        around(Some(header.spans), &mut || checked = view.prove(None).ok());
+        around(&mut || {
+            checked = view.prove(None).ok();
+            Work::Proof(header.spans)
+        });
         let table = checked?;
         let mut cursor = Cursor::new(&table).ok()?;
         let mut clock = PathClock::new(header.tick_ns);
         loop {
             let mut setpoint = None;
-            around(None, &mut || setpoint = cursor.evaluate(&table, clock.time()).ok());
+            let span = cursor.span();
+            around(&mut || {
+                setpoint = cursor.evaluate(&table, clock.time()).ok();
+                if cursor.span() == span { Work::Evaluate } else { Work::Span }
+            });
             let s = setpoint?;
             clock.advance();
             setpoints += 1;
-            hash = hash
-                .with(&s.position.to_le_bytes())
-                .with(&s.velocity.to_bits().to_le_bytes())
-                .with(&s.acceleration.to_bits().to_le_bytes());
+            hash = s.hashed(hash);
             if s.done {
                 break;
             }
+        }
+    }
+    Some(Played { setpoints, hash: hash.finish() })
+}
+
+/// Plays every table on a drive, with overrides, holds, quick stops and moves on the way; `around` is put round each tick.
+///
+/// `None`: a table is refused.
+pub fn drive(
+    bytes: &[u8],
+    [a, b]: [&mut [u8]; 2],
+    mut around: impl FnMut(&mut dyn FnMut() -> Work),
+) -> Option<Played> {
+    let (mut hash, mut setpoints) = (Fnv64::new(), 0u64);
+    let mut chance = Chance(0x1234_5678_9abc_def1);
+    for [header, axis, shared, controls] in Stored::new(bytes) {
+        let header: TableHeader = protocol::message::decode(header).ok()?;
+        let axis: AxisHeader = protocol::message::decode(axis).ok()?;
+        let config =
+            AxisConfig { position: axis.start, ..AxisConfig::new(axis.axis, header.tick_ns, axis.limits) };
+        let mut player = Player::new(config, &mut *a, &mut *b);
+        let table = header.table;
+        for event in [PowerEvent::Shutdown, PowerEvent::EnableOperation] {
+            player.handle(&HostMessage::Power(event));
+        }
+        player.handle(&HostMessage::Open(header));
+        player.handle(&HostMessage::OpenAxis(axis));
+        let sealed = [
+            (Part::Shared, shared, part_crc(&header, &[shared]).ok()?),
+            (Part::Axis, controls, part_crc(&axis, &[controls]).ok()?),
+        ];
+        for (part, bytes, crc) in sealed {
+            let mut offset = 0u32;
+            for bytes in bytes.chunks(DATA_BYTES) {
+                player.handle(&HostMessage::Data { table, part, offset, bytes });
+                offset += bytes.len() as u32;
+            }
+            player.handle(&HostMessage::Seal { table, part, crc });
+        }
+        player.handle(&HostMessage::Start { table, tick: 0 });
+        let end = player.status().fill;
+        let instant = |chance: &mut Chance| (end as f32 * chance.unit()) as u64;
+        let (change, stop) = (instant(&mut chance), instant(&mut chance));
+        // One table in three is played as it is, one at another rate, one is left on the way.
+        let fate = (chance.unit() * 3.0) as u8;
+        let permille = if chance.unit() < 0.5 { 0 } else { (chance.unit() * 1000.0) as u16 };
+        if fate > 0 {
+            player.handle(&HostMessage::Override { permille, tick: change });
+        }
+        let mut tick = 0u64;
+        let mut returns = false;
+        loop {
+            if fate == 1 && tick == change + 600 {
+                player.handle(&HostMessage::Override { permille: 1000, tick });
+            }
+            let stops = fate == 2 && tick == stop;
+            if stops {
+                player.handle(&HostMessage::QuickStop);
+            }
+            let plain = fate == 0 || tick <= change;
+            let mut s = Setpoint::at_rest(0);
+            around(&mut || {
+                s = player.tick();
+                if fate == 2 && tick >= stop {
+                    Work::Fallback
+                } else if plain {
+                    Work::Tick
+                } else {
+                    Work::Override
+                }
+            });
+            tick += 1;
+            setpoints += 1;
+            hash = s.hashed(hash);
+            if s.done && (fate < 2 || returns) {
+                break;
+            }
+            if s.done && tick > stop {
+                returns = true;
+                player.handle(&HostMessage::Power(PowerEvent::EnableOperation));
+                player.handle(&HostMessage::MoveTo { position: axis.end, velocity: None });
+            }
+        }
+        let status = player.status();
+        if status.fault.is_some() || status.position != axis.end {
+            return None;
         }
     }
     Some(Played { setpoints, hash: hash.finish() })
@@ -89,7 +202,7 @@ pub struct Planned {
 }
 
 /// Plans `count` random motions; `around` is put round each.
-pub fn plan_moves(count: u32, mut around: impl FnMut(&mut dyn FnMut())) -> Planned {
+pub fn plan_moves(count: u32, mut around: impl FnMut(&mut dyn FnMut() -> Work)) -> Planned {
     let mut chance = Chance(0x9e37_79b9_7f4a_7c15);
     let mut hash = Fnv64::new();
     let mut planned = Planned::default();
@@ -107,7 +220,10 @@ pub fn plan_moves(count: u32, mut around: impl FnMut(&mut dyn FnMut())) -> Plann
         // Starts reach beyond their limits, targets keep well within.
         let (from, to) = (state(3.0, 1.3), state(3.0, 0.4));
         let mut found = Err(DoubleSError::Precision);
-        around(&mut || found = plan(&from, &to, &limits));
+        around(&mut || {
+            found = plan(&from, &to, &limits);
+            Work::Plan
+        });
         match found {
             Ok(profile) => {
                 planned.plans += 1;

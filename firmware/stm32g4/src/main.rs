@@ -6,7 +6,7 @@
 #![no_std]
 #![no_main]
 
-use core::cell::RefCell;
+use core::cell::Cell;
 
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::exception;
@@ -20,9 +20,10 @@ use embassy_stm32::peripherals::FDCAN1;
 use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, bind_interrupts, can};
-use firmware_core::drive::{Drive, DriveConfig};
+use firmware_core::axis::AxisConfig;
+use firmware_core::drive::DriveConfig;
 use firmware_core::evaluate::Setpoint;
-use firmware_core::player::AxisConfig;
+use firmware_core::halves::{Between, Move};
 use protocol::bus::{Frame, FrameSize, Node};
 use protocol::table::Limits;
 
@@ -51,19 +52,19 @@ const CONFIG: DriveConfig = {
         node,
         frames: if cfg!(feature = "fd") { FrameSize::Fd } else { FrameSize::Classic },
         axis: AxisConfig {
-            axis: NODE - 1,
-            tick_ns: TICK_NS,
-            position: 0,
-            // Those of the motor and the slide: set them before anything moves.
-            limits: Limits { velocity: 1e6, acceleration: 1e8, jerk: Some(1e10) },
-            travel: None,
             status_ticks: 400,
+            // Limits are those of the motor and the slide: set them before anything moves, and the travel.
+            ..AxisConfig::new(
+                NODE - 1,
+                TICK_NS,
+                Limits { velocity: 1e6, acceleration: 1e8, jerk: Some(1e10) },
+            )
         },
     }
 };
 
-/// The drive, shared by the control interrupt and the bus.
-static DRIVE: Mutex<RefCell<Option<Drive<'static>>>> = Mutex::new(RefCell::new(None));
+/// The half that moves, on its way from [`main`] to the control interrupt.
+static MOVES: Mutex<Cell<Option<&'static mut Move<'static, 'static>>>> = Mutex::new(Cell::new(None));
 
 bind_interrupts!(struct Irqs {
     FDCAN1_IT0 => IT0InterruptHandler<FDCAN1>;
@@ -74,15 +75,14 @@ bind_interrupts!(struct Irqs {
 async fn main(_spawner: Spawner) {
     static mut A: [u8; ROOM] = [0; ROOM];
     static mut B: [u8; ROOM] = [0; ROOM];
-    // SAFETY: this runs once, and nobody else names the two.
-    let (a, b) = unsafe { (&mut *(&raw mut A), &mut *(&raw mut B)) };
+    static mut BETWEEN: Between<'static> = Between::new();
+    static mut PLACE: Option<Move<'static, 'static>> = None;
+    // SAFETY: this runs once, and nobody else names the four.
+    let (a, b, between, place) =
+        unsafe { (&mut *(&raw mut A), &mut *(&raw mut B), &mut *(&raw mut BETWEEN), &mut *(&raw mut PLACE)) };
     let peripherals = embassy_stm32::init(clocks());
-    let drive = Drive::new(CONFIG, a, b);
-    critical_section::with(|cs| {
-        if let Ok(mut place) = DRIVE.borrow(cs).try_borrow_mut() {
-            *place = Some(drive);
-        }
-    });
+    let (mut talk, moves) = between.drive(CONFIG, a, b);
+    critical_section::with(|cs| MOVES.borrow(cs).set(Some(place.insert(moves))));
     if let Some(core) = cortex_m::Peripherals::take() {
         let mut timer = core.SYST;
         timer.set_clock_source(SystClkSource::Core);
@@ -100,9 +100,9 @@ async fn main(_spawner: Spawner) {
     let (mut out, mut into, _) = bus.into_normal_mode().split();
     loop {
         if let Either::First(Some(frame)) = select(receive(&mut into), yield_now()).await {
-            with_drive(|drive| drive.receive(&frame));
+            talk.receive(&frame);
         }
-        if let Some(frame) = with_drive(Drive::poll_transmit).flatten() {
+        if let Some(frame) = talk.poll_transmit() {
             send(&mut out, &frame).await;
         }
     }
@@ -163,19 +163,19 @@ fn clocks() -> Config {
 /// The control tick.
 #[exception]
 fn SysTick() {
-    if let Some(setpoint) = with_drive(Drive::tick) {
-        apply(setpoint);
+    static mut HERE: Option<&'static mut Move<'static, 'static>> = None;
+    if HERE.is_none() {
+        *HERE = critical_section::with(|cs| MOVES.borrow(cs).take());
+    }
+    if let Some(moves) = HERE {
+        let setpoint = moves.tick();
+        apply(setpoint, moves.motion().power().has_torque());
     }
 }
 
-/// Hands a set-point to the servo: whoever has a power stage closes the position loop here.
-fn apply(setpoint: Setpoint) {
-    let _ = setpoint;
-}
-
-/// Does something to the drive while nobody else can.
-fn with_drive<R>(act: impl FnOnce(&mut Drive<'static>) -> R) -> Option<R> {
-    critical_section::with(|cs| DRIVE.borrow(cs).try_borrow_mut().ok()?.as_mut().map(act))
+/// Hands a set-point to the servo: whoever has a power stage closes the position loop here, and switches the stage.
+fn apply(setpoint: Setpoint, torque: bool) {
+    let _ = (setpoint, torque);
 }
 
 #[panic_handler]

@@ -2,15 +2,16 @@
 #![no_std]
 #![no_main]
 
-use core::cell::RefCell;
+use core::cell::Cell;
 
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::{entry, exception};
 use critical_section::Mutex;
 use emulated::CLOCK_HZ;
 use emulated::uart::Uart;
-use firmware_core::drive::{Drive, DriveConfig};
-use firmware_core::player::AxisConfig;
+use firmware_core::axis::AxisConfig;
+use firmware_core::drive::DriveConfig;
+use firmware_core::halves::{Between, Move};
 use protocol::bus::slcan::{self, LINE_BYTES, Line, Reader};
 use protocol::bus::{FrameSize, Node};
 use protocol::table::Limits;
@@ -34,29 +35,23 @@ const CONFIG: DriveConfig = {
         node,
         frames: FrameSize::Classic,
         axis: AxisConfig {
-            axis: NODE - 1,
-            tick_ns: TICK_NS,
-            position: 0,
-            limits: Limits { velocity: 1e9, acceleration: 1e11, jerk: None },
-            travel: None,
             status_ticks: 100,
+            ..AxisConfig::new(NODE - 1, TICK_NS, Limits { velocity: 1e9, acceleration: 1e11, jerk: None })
         },
     }
 };
 
-/// The drive, shared by the control interrupt and the serial port.
-static DRIVE: Mutex<RefCell<Option<Drive<'static>>>> = Mutex::new(RefCell::new(None));
+/// The half that moves, on its way from [`main`] to the control interrupt.
+static MOVES: Mutex<Cell<Option<&'static mut Move<'static, 'static>>>> = Mutex::new(Cell::new(None));
 
 #[entry]
 fn main() -> ! {
     static mut A: [u8; ROOM] = [0; ROOM];
     static mut B: [u8; ROOM] = [0; ROOM];
-    let drive = Drive::new(CONFIG, A, B);
-    critical_section::with(|cs| {
-        if let Ok(mut place) = DRIVE.borrow(cs).try_borrow_mut() {
-            *place = Some(drive);
-        }
-    });
+    static mut BETWEEN: Between<'static> = Between::new();
+    static mut PLACE: Option<Move<'static, 'static>> = None;
+    let (mut talk, moves) = BETWEEN.drive(CONFIG, A, B);
+    critical_section::with(|cs| MOVES.borrow(cs).set(Some(PLACE.insert(moves))));
     if let Some(core) = cortex_m::Peripherals::take() {
         let mut timer = core.SYST;
         timer.set_clock_source(SystClkSource::Core);
@@ -72,17 +67,14 @@ fn main() -> ! {
     loop {
         if let Some(line) = uart.read().and_then(|byte| reader.push(byte)) {
             match line {
-                Line::Frame(frame) => {
-                    with_drive(|drive| drive.receive(&frame));
-                }
+                Line::Frame(frame) => talk.receive(&frame),
                 // Opening, closing and the bit rate of an adapter mean nothing here, and are granted.
                 Line::Command(_) => uart.write(b'\r'),
                 Line::Empty => {}
                 Line::Malformed => uart.write(0x07),
             }
         }
-        let frame = with_drive(Drive::poll_transmit).flatten();
-        if let Some(frame) = frame {
+        if let Some(frame) = talk.poll_transmit() {
             slcan::line(&frame, &mut text).iter().for_each(|byte| uart.write(*byte));
         }
     }
@@ -91,12 +83,13 @@ fn main() -> ! {
 /// The control tick. A power stage would take the set-point from here.
 #[exception]
 fn SysTick() {
-    let _ = with_drive(Drive::tick);
-}
-
-/// Does something to the drive while nobody else can.
-fn with_drive<R>(act: impl FnOnce(&mut Drive<'static>) -> R) -> Option<R> {
-    critical_section::with(|cs| DRIVE.borrow(cs).try_borrow_mut().ok()?.as_mut().map(act))
+    static mut HERE: Option<&'static mut Move<'static, 'static>> = None;
+    if HERE.is_none() {
+        *HERE = critical_section::with(|cs| MOVES.borrow(cs).take());
+    }
+    if let Some(moves) = HERE {
+        let _ = moves.tick();
+    }
 }
 
 #[panic_handler]

@@ -8,7 +8,7 @@ use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::{debug, hprintln};
-use emulated::workload::{plan_moves, play};
+use emulated::workload::{Work, drive, evaluate, plan_moves};
 
 /// Tables of real jobs.
 static TABLES: &[u8] = include_bytes!(env!("FEEDSPLINE_TABLES"));
@@ -43,16 +43,37 @@ impl Cost {
     }
 }
 
-/// SysTick counts that `work` takes; it counts down 24 bits.
+/// SysTick counts that `work` takes, and what it was; the timer counts down 24 bits.
 #[inline(never)]
-fn counted(work: &mut dyn FnMut()) -> u32 {
+fn counted(work: &mut dyn FnMut() -> Work) -> (Work, u32) {
     let before = SYST::get_current();
-    work();
-    before.wrapping_sub(SYST::get_current()) & 0x00ff_ffff
+    let what = work();
+    (what, before.wrapping_sub(SYST::get_current()) & 0x00ff_ffff)
 }
+
+/// Names of what is counted.
+const NAMES: [&str; 7] =
+    ["prove_per_span", "evaluate", "span", "tick", "tick_override", "tick_fallback", "plan"];
+
+fn place(work: Work) -> usize {
+    match work {
+        Work::Proof(_) => 0,
+        Work::Evaluate => 1,
+        Work::Span => 2,
+        Work::Tick => 3,
+        Work::Override => 4,
+        Work::Fallback => 5,
+        Work::Plan => 6,
+    }
+}
+
+/// Room for one table [bytes].
+const ROOM: usize = 64 * 1024;
 
 #[entry]
 fn main() -> ! {
+    static mut A: [u8; ROOM] = [0; ROOM];
+    static mut B: [u8; ROOM] = [0; ROOM];
     if let Some(core) = cortex_m::Peripherals::take() {
         let mut timer = core.SYST;
         timer.set_clock_source(SystClkSource::Core);
@@ -60,28 +81,32 @@ fn main() -> ! {
         timer.clear_current();
         timer.enable_counter();
     }
-    let empty = counted(&mut || {});
-    let net = |counts: u32| counts.saturating_sub(empty);
-    let (mut tick, mut prove, mut plan) = (Cost::default(), Cost::default(), Cost::default());
-    let played = play(TABLES, |spans, work| {
-        let counts = net(counted(work));
-        match spans {
-            Some(spans) => prove.note(counts / spans.max(1)),
-            None => tick.note(counts),
+    let (_, empty) = counted(&mut || Work::Plan);
+    let mut costs: [Cost; 7] = Default::default();
+    let mut note = |work: &mut dyn FnMut() -> Work| {
+        let (what, counts) = counted(work);
+        let counts = counts.saturating_sub(empty);
+        let counts = if let Work::Proof(spans) = what { counts / spans.max(1) } else { counts };
+        if let Some(cost) = costs.get_mut(place(what)) {
+            cost.note(counts);
         }
-    });
-    let Some(played) = played else {
+    };
+    let evaluated = evaluate(TABLES, &mut note);
+    let driven = drive(TABLES, [A, B], &mut note);
+    let (Some(evaluated), Some(driven)) = (evaluated, driven) else {
         hprintln!("a table is refused");
         debug::exit(debug::EXIT_FAILURE);
         loop {}
     };
-    let planned = plan_moves(MOVES, |work| plan.note(net(counted(work))));
-    hprintln!("setpoints {}", played.setpoints);
-    hprintln!("setpoint_hash {}", played.hash);
+    let planned = plan_moves(MOVES, &mut note);
+    hprintln!("setpoints {}", evaluated.setpoints);
+    hprintln!("setpoint_hash {}", evaluated.hash);
+    hprintln!("driven {}", driven.setpoints);
+    hprintln!("driven_hash {}", driven.hash);
     hprintln!("plans {}", planned.plans);
     hprintln!("imprecise {}", planned.imprecise);
     hprintln!("plan_hash {}", planned.hash);
-    for (name, cost) in [("tick", &tick), ("prove_per_span", &prove), ("plan", &plan)] {
+    for (name, cost) in NAMES.iter().zip(&costs) {
         hprintln!("{}_most {}", name, cost.most());
         hprintln!("{}_mean {}", name, cost.mean());
     }
