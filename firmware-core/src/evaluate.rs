@@ -49,8 +49,9 @@ pub struct Cursor {
     piece: PieceCursor,
     /// Path time at which the span began [2^-32 s].
     began: u64,
-    /// From the start of the geometry span to the start of the q span [grid steps].
+    /// From the start of the geometry span to the start of the q span [grid steps], and the same [u].
     offset: u32,
+    offset_u: f32,
 }
 
 impl Cursor {
@@ -60,7 +61,13 @@ impl Cursor {
     /// None on a table whose bytes are still those that were checked.
     pub fn new(table: &CheckedTable<'_>) -> Result<Self, TableError> {
         let view = table.view();
-        Ok(Self { law: LawCursor::start(view)?, piece: PieceCursor::start(view)?, began: 0, offset: 0 })
+        Ok(Self {
+            law: LawCursor::start(view)?,
+            piece: PieceCursor::start(view)?,
+            began: 0,
+            offset: 0,
+            offset_u: 0.0,
+        })
     }
 
     /// The set-point at path time `time` [2^-32 s].
@@ -71,6 +78,24 @@ impl Cursor {
     /// # Errors
     /// None on a table whose bytes are still those that were checked.
     pub fn evaluate(&mut self, table: &CheckedTable<'_>, time: u64) -> Result<Setpoint, TableError> {
+        let mut local = time.saturating_sub(self.began);
+        if local >= self.law.duration() {
+            self.pass(table, time)?;
+            local = time.saturating_sub(self.began);
+        }
+        if !self.law.is_last() {
+            return Ok(self.piece.at(self.offset_u, self.law.at(local)));
+        }
+        let left = self.law.duration().saturating_sub(local);
+        if left == 0 {
+            return Ok(Setpoint::at_rest(table.view().axis.end));
+        }
+        Ok(self.piece.before_end(self.law.at(left)))
+    }
+
+    /// Goes on to the span of a time.
+    #[inline(never)]
+    fn pass(&mut self, table: &CheckedTable<'_>, time: u64) -> Result<(), TableError> {
         let view = table.view();
         while !self.law.is_last() && time.saturating_sub(self.began) >= self.law.duration() {
             self.began = self.began.saturating_add(self.law.duration());
@@ -82,17 +107,9 @@ impl Cursor {
             } else {
                 self.offset = self.offset.saturating_add(step);
             }
+            self.offset_u = self.offset as f32 * view.header.step();
         }
-        let local = time.saturating_sub(self.began);
-        if self.law.is_last() {
-            if local >= self.law.duration() {
-                return Ok(Setpoint::at_rest(view.axis.end));
-            }
-            let path = self.law.at(self.law.duration() - local);
-            return Ok(self.piece.before_end(path));
-        }
-        let path = self.law.at(local);
-        Ok(self.piece.at(self.offset as f32 * view.header.step(), path))
+        Ok(())
     }
 
     /// The q span that plays, from 0.

@@ -8,7 +8,7 @@ use crate::evaluate::Setpoint;
 /// Share by which a set-point may exceed a limit before the drive faults: more than a proven table ever does.
 const TRIP: f32 = 0.02;
 /// What rounding adds to the way of one tick [counts].
-const STEP_COUNTS: f32 = 2.0;
+const STEP_COUNTS: u64 = 2;
 
 /// Limits of set-points.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,7 @@ pub(crate) struct Guard {
     /// The same while the rate of path time is not 1.
     acceleration_at_rates: f32,
     /// Way of one tick [counts].
-    step: f32,
+    step: u64,
     travel: Option<[i64; 2]>,
 }
 
@@ -30,14 +30,15 @@ impl Guard {
             velocity,
             acceleration,
             acceleration_at_rates: acceleration * config.excess.acceleration,
-            step: velocity * (config.tick_ns as f32 * 1e-9) + STEP_COUNTS,
+            step: ((velocity * (config.tick_ns as f32 * 1e-9)) as u64).saturating_add(STEP_COUNTS),
             travel: config.travel,
         }
     }
 
     /// A set-point that keeps the limits; `last` is the one before, `plain` says that path time goes as planned.
+    #[inline]
     pub(crate) fn check(&self, setpoint: &Setpoint, last: i64, plain: bool) -> Result<(), AxisLimit> {
-        let moved = setpoint.position.saturating_sub(last).unsigned_abs() as f32;
+        let moved = setpoint.position.abs_diff(last);
         // What is not a number keeps nothing.
         let slow = setpoint.velocity.abs() <= self.velocity && moved <= self.step;
         if !slow {

@@ -72,6 +72,10 @@ struct Ends<'q, 'a> {
 }
 
 impl<'a> Link<'a> for Ends<'_, 'a> {
+    fn has_orders(&self) -> bool {
+        self.next.ready()
+    }
+
     fn next_order(&mut self) -> Option<Order<'a>> {
         self.next.dequeue()
     }

@@ -25,6 +25,9 @@ const MOST_PERMILLE: u16 = 2000;
 
 /// Where orders come from and reports go; neither ever waits.
 pub trait Link<'a> {
+    /// There is an order.
+    fn has_orders(&self) -> bool;
+
     /// The oldest order.
     fn next_order(&mut self) -> Option<Order<'a>>;
 
@@ -72,6 +75,9 @@ struct Change {
 pub struct Motion<'a> {
     config: AxisConfig,
     guard: Guard,
+    /// Length of a tick [2^-32 s], and its inverse [1/s].
+    tick_time: i64,
+    per_s: f32,
     /// Number of the next tick.
     tick: u64,
     status_in: u32,
@@ -100,6 +106,8 @@ impl<'a> Motion<'a> {
         Self {
             config,
             guard: Guard::new(&config),
+            tick_time: tick_time(config.tick_ns) as i64,
+            per_s: 1e9 / config.tick_ns as f32,
             tick: 0,
             status_in: config.status_ticks,
             silence: 0,
@@ -120,24 +128,29 @@ impl<'a> Motion<'a> {
 
     /// The set-point of this tick; call it once per control tick.
     pub fn tick(&mut self, link: &mut impl Link<'a>) -> Setpoint {
-        self.take_orders(link);
-        self.listen();
-        let setpoint = self.set_point();
-        self.last = setpoint;
-        if setpoint.done {
+        if link.has_orders() || !self.back.is_empty() {
+            self.take_orders(link);
+        }
+        if self.config.options.lost_ticks > 0 {
+            self.listen();
+        }
+        self.last = self.set_point();
+        if self.last.done {
             self.settle();
         }
-        self.tick = self.tick.saturating_add(1);
+        // It takes a million years at 500 kHz.
+        self.tick = self.tick.wrapping_add(1);
         if self.config.status_ticks > 0 {
             self.status_in = self.status_in.saturating_sub(1);
             if self.status_in == 0 {
                 self.tell(link);
             }
         }
-        setpoint
+        self.last
     }
 
     /// Does what was ordered, up to the first order that takes planning.
+    #[inline(never)]
     pub fn take_orders(&mut self, link: &mut impl Link<'a>) {
         while let Some(order) = link.next_order() {
             self.silence = 0;
@@ -361,7 +374,7 @@ impl<'a> Motion<'a> {
     fn listen(&mut self) {
         self.silence = self.silence.saturating_add(1);
         let options = self.config.options;
-        if options.lost_ticks == 0 || self.silence <= options.lost_ticks || !self.power.has_torque() {
+        if self.silence <= options.lost_ticks || !self.power.has_torque() {
             return;
         }
         match options.lost {
@@ -382,25 +395,39 @@ impl<'a> Motion<'a> {
         if self.excursion.is_some() {
             return self.stray();
         }
-        if let Some(change) = self.change.filter(|change| change.tick <= self.tick) {
-            self.change = None;
+        if let Some(change) = &self.change
+            && change.tick <= self.tick
+        {
             self.rate.aim(change.target);
+            self.change = None;
         }
-        let planned = self.begin().and_then(|()| self.play()).and_then(|setpoint| {
-            let allowed = self.guard.check(&setpoint, self.last.position, self.rate.is_plain());
-            allowed.map(|()| setpoint).map_err(Fault::Limit)
-        });
-        planned.unwrap_or_else(|fault| {
-            self.fail(fault);
-            self.stray()
-        })
+        let due = self.armed.as_ref().is_some_and(|armed| armed.tick <= self.tick);
+        if due && let Err(fault) = self.begin() {
+            return self.fail_now(fault);
+        }
+        let setpoint = match self.play() {
+            Ok(setpoint) => setpoint,
+            Err(fault) => return self.fail_now(fault),
+        };
+        match self.guard.check(&setpoint, self.last.position, self.rate.is_plain()) {
+            Ok(()) => setpoint,
+            Err(limit) => self.fail_now(Fault::Limit(limit)),
+        }
     }
 
-    /// At the tick of the start, and when the table before it is at its end, the armed table becomes the one that plays.
+    /// A fault of this tick: the way to rest begins at once.
+    #[cold]
+    #[inline(never)]
+    fn fail_now(&mut self, fault: Fault) -> Setpoint {
+        self.fail(fault);
+        self.stray()
+    }
+
+    /// When the table before it is at its end, the armed table becomes the one that plays.
+    #[inline(never)]
     fn begin(&mut self) -> Result<(), Fault> {
-        let due = self.armed.as_ref().is_some_and(|armed| armed.tick <= self.tick);
-        let free = || self.playing.as_ref().is_none_or(|p| p.clock.time() >= p.table.duration());
-        if !due || !free() {
+        let free = self.playing.as_ref().is_none_or(|p| p.clock.time() >= p.table.duration());
+        if !free {
             return Ok(());
         }
         if let Some(before) = self.playing.take() {
@@ -437,30 +464,37 @@ impl<'a> Motion<'a> {
             .cursor
             .evaluate(&table, playing.clock.time())
             .map_err(|error| Fault::Table { table: table.header().table, error })?;
+        if !setpoint.done && self.rate.is_plain() {
+            playing.clock.advance();
+            return Ok(setpoint);
+        }
+        Ok(self.play_unusually(setpoint))
+    }
+
+    /// The end of a table, and rates other than 1.
+    #[inline(never)]
+    fn play_unusually(&mut self, setpoint: Setpoint) -> Setpoint {
         if setpoint.done {
             if let Some(playing) = self.playing.take() {
                 self.give_back(playing.table, false);
             }
             self.has_played = true;
-            return Ok(setpoint);
+            return setpoint;
         }
-        if self.rate.is_plain() {
+        let Some(playing) = &mut self.playing else { return setpoint };
+        let Some(warp) = &playing.table.header().warp else {
             playing.clock.advance();
-            return Ok(setpoint);
-        }
-        let Some(warp) = &table.header().warp else {
-            playing.clock.advance();
-            return Ok(setpoint);
+            return setpoint;
         };
         let pace = self.rate.advance(warp);
         self.lag = self.lag.saturating_add(playing.clock.advance_at(pace.mean));
         self.delay();
-        Ok(at_pace(&setpoint, &pace, self.config.tick_ns))
+        at_pace(&setpoint, &pace, self.per_s)
     }
 
     /// What is lost of path time puts off all that is planned, tick by whole tick.
     fn delay(&mut self) {
-        let tick = tick_time(self.config.tick_ns) as i64;
+        let tick = self.tick_time;
         let late = if self.lag >= tick {
             1
         } else if self.lag <= tick.saturating_neg() {
@@ -478,6 +512,7 @@ impl<'a> Motion<'a> {
     }
 
     /// The next set-point of a motion without a table.
+    #[inline(never)]
     fn stray(&mut self) -> Setpoint {
         let Some(excursion) = &mut self.excursion else { return Setpoint::at_rest(self.last.position) };
         let setpoint = excursion.course.next();
@@ -501,6 +536,7 @@ impl<'a> Motion<'a> {
     }
 
     /// At rest: a reaction has ended.
+    #[inline(never)]
     fn settle(&mut self) {
         let ends = match self.power {
             Power::FaultReactionActive => true,
@@ -582,9 +618,9 @@ impl<'a> Motion<'a> {
 }
 
 /// A set-point of the path at another rate: v s, a s^2 + v s'.
-fn at_pace(setpoint: &Setpoint, pace: &Pace, tick_ns: u32) -> Setpoint {
+fn at_pace(setpoint: &Setpoint, pace: &Pace, per_s: f32) -> Setpoint {
     let Setpoint { position, velocity, acceleration, done } = *setpoint;
-    let change = pace.change * (1e9 / tick_ns as f32);
+    let change = pace.change * per_s;
     Setpoint {
         position,
         velocity: velocity * pace.s,

@@ -35,6 +35,10 @@ impl<'a> Orders<'a> for Queues<'a> {
 }
 
 impl<'a> Link<'a> for Queues<'a> {
+    fn has_orders(&self) -> bool {
+        !self.orders.is_empty()
+    }
+
     fn next_order(&mut self) -> Option<Order<'a>> {
         self.orders.pop_front()
     }

@@ -20,6 +20,8 @@ pub(crate) struct Rate {
     steps: i64,
     rest: i64,
     bend: i64,
+    /// Path time goes as planned, and nothing changes that.
+    plain: bool,
 }
 
 /// What a tick does.
@@ -34,8 +36,13 @@ pub(crate) struct Pace {
 
 impl Default for Rate {
     fn default() -> Self {
-        Self { s: RATE_ONE, target: RATE_ONE, steps: 0, rest: 0, bend: 1 }
+        Self { s: RATE_ONE, target: RATE_ONE, steps: 0, rest: 0, bend: 1, plain: true }
     }
+}
+
+/// A rate as a number.
+fn rate(s: u64) -> f32 {
+    (s >> 24) as u32 as f32 * (1.0 / (1u32 << 24) as f32)
 }
 
 /// A commanded rate [2^-48].
@@ -46,7 +53,11 @@ pub(crate) fn of_permille(permille: u16) -> u64 {
 impl Rate {
     /// Path time goes as planned, and nothing changes that.
     pub(crate) fn is_plain(&self) -> bool {
-        self.is_steady() && self.s == RATE_ONE
+        self.plain
+    }
+
+    fn look(&mut self) {
+        self.plain = self.s == RATE_ONE && self.is_steady();
     }
 
     /// The rate does not change.
@@ -62,11 +73,13 @@ impl Rate {
     /// Asks for another rate.
     pub(crate) fn aim(&mut self, target: u64) {
         self.target = target;
+        self.look();
     }
 
     /// While nothing moves the rate may jump.
     pub(crate) fn jump(&mut self) {
         (self.s, self.steps, self.rest) = (self.target, 0, 0);
+        self.look();
     }
 
     /// The rate that is wanted [2^-48].
@@ -77,25 +90,31 @@ impl Rate {
     /// One tick on, within the bounds of the table that plays.
     pub(crate) fn advance(&mut self, warp: &Warp) -> Pace {
         let (before, s) = (self.step(), self.s);
+        if self.is_steady() {
+            return Pace { s: rate(s), change: 0.0, mean: s >> 18 };
+        }
         self.bend = warp.bend as i64;
         self.choose(warp);
         let after = self.step();
         self.s = self.s.saturating_add_signed(after);
+        self.look();
         Pace {
-            s: (s >> 24) as u32 as f32 * (1.0 / (1u32 << 24) as f32),
+            s: rate(s),
             change: before.saturating_add(after) as f32 * (0.5 / RATE_ONE as f32),
             mean: s.saturating_add(self.s) >> 19,
         }
     }
 
     fn step(&self) -> i64 {
-        self.steps.saturating_mul(self.bend).saturating_add(self.rest)
+        // Below 2^50: no rate is left behind in one tick.
+        self.steps.wrapping_mul(self.bend).wrapping_add(self.rest)
     }
 
     /// The step until the next tick.
     fn choose(&mut self, warp: &Warp) {
         let bend = self.bend;
-        let far = (self.target as i64).saturating_sub(self.s as i64);
+        // Rates are below 2^50, steps and bends below what the rate admits per tick.
+        let far = (self.target as i64).wrapping_sub(self.s as i64);
         if self.rest != 0 || (self.steps == 0 && far.abs() < bend) {
             // The last step of a ramp, and the end of it.
             let last = if self.rest == 0 { far } else { 0 };
@@ -104,20 +123,19 @@ impl Rate {
         }
         // Seen towards the target.
         let sign = if far < 0 { -1 } else { 1 };
-        let (far, steps) = (far.saturating_mul(sign), self.steps.saturating_mul(sign));
+        let (far, steps) = if far < 0 { (-far, -self.steps) } else { (far, self.steps) };
         if steps < 0 {
-            self.steps = self.steps.saturating_add(sign);
+            self.steps = self.steps.wrapping_add(sign);
             return;
         }
         let most = if sign < 0 { warp.descent(self.s) } else { warp.climb() } as i64;
         let fits = |steps: i64| {
-            let ahead = steps.saturating_mul(bend);
-            // Steps of one bend less each, down to none.
-            let braking = ahead.saturating_mul(steps.saturating_sub(1)) / 2;
-            ahead <= most && ahead.saturating_add(braking) <= far
+            let ahead = steps.wrapping_mul(bend);
+            // Then steps of one bend less each, down to none: in all it is (steps + 1)/2 times as far.
+            ahead <= most && ahead.wrapping_mul(steps.wrapping_add(1)) <= far.wrapping_mul(2)
         };
-        let faster = steps.saturating_add(1);
-        let slower = steps.saturating_sub(1).max(0);
+        let faster = steps.wrapping_add(1);
+        let slower = steps.wrapping_sub(1).max(0);
         let chosen = if fits(faster) {
             faster
         } else if fits(steps) {
@@ -125,7 +143,7 @@ impl Rate {
         } else {
             slower
         };
-        self.steps = chosen.saturating_mul(sign);
+        self.steps = if sign < 0 { -chosen } else { chosen };
     }
 }
 

@@ -11,15 +11,15 @@ pub struct PathClock {
     time: u64,
     step: u64,
     /// Remainders [1e-9 units].
-    step_rest: u64,
-    rest: u64,
+    step_rest: u32,
+    rest: u32,
 }
 
 impl PathClock {
     /// Zero, for ticks of `tick_ns`.
     pub fn new(tick_ns: u32) -> Self {
         let scaled = u64::from(tick_ns) << 32;
-        Self { time: 0, step: scaled / NS_PER_S, step_rest: scaled % NS_PER_S, rest: 0 }
+        Self { time: 0, step: scaled / NS_PER_S, step_rest: (scaled % NS_PER_S) as u32, rest: 0 }
     }
 
     /// Path time [2^-32 s].
@@ -29,8 +29,8 @@ impl PathClock {
 
     /// So many ticks on.
     pub(crate) fn skip(&mut self, ticks: u64) {
-        let rest = ticks.saturating_mul(self.step_rest).saturating_add(self.rest);
-        self.rest = rest % NS_PER_S;
+        let rest = ticks.saturating_mul(u64::from(self.step_rest)).saturating_add(u64::from(self.rest));
+        self.rest = (rest % NS_PER_S) as u32;
         let whole = ticks.saturating_mul(self.step).saturating_add(rest / NS_PER_S);
         self.time = self.time.saturating_add(whole);
     }
@@ -44,10 +44,11 @@ impl PathClock {
 
     /// One tick on.
     pub fn advance(&mut self) {
-        self.rest += self.step_rest;
-        let carry = u64::from(self.rest >= NS_PER_S);
-        self.rest -= carry * NS_PER_S;
-        self.time = self.time.saturating_add(self.step + carry);
+        // Both are below 1e9; path time wraps after 136 years.
+        let rest = self.rest.wrapping_add(self.step_rest);
+        let carries = rest >= NS_PER_S as u32;
+        self.rest = if carries { rest.wrapping_sub(NS_PER_S as u32) } else { rest };
+        self.time = self.time.wrapping_add(self.step).wrapping_add(u64::from(carries));
     }
 }
 

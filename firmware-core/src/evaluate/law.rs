@@ -159,8 +159,10 @@ impl LawCursor {
     }
 
     /// Motion at local time `time` [2^-32 s], counted from the end on the last span.
+    #[inline]
     pub(crate) fn at(&self, time: u64) -> PathState {
-        let t = ((time >> self.shift) as u32) as f32 * self.scale;
+        let t = if self.shift == 0 { time as u32 } else { (time >> (self.shift & 31)) as u32 };
+        let t = t as f32 * self.scale;
         match self.law {
             Law::Launch { h, rate } => rest(h, rate, t),
             Law::Landing { h, rate } => {
@@ -189,6 +191,7 @@ impl LawCursor {
     }
 
     /// How long the span takes [2^-32 s].
+    #[inline]
     pub(crate) fn duration(&self) -> u64 {
         self.duration
     }

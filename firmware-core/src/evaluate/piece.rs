@@ -16,7 +16,12 @@ use crate::table::TableView;
 struct Cubic {
     base: i64,
     power: [f32; 4],
+    /// 2 c2, 3 c3 and 6 c3: for the derivatives.
+    steep: [f32; 3],
 }
+
+/// Added to a number, it leaves no room for its fraction: the sum's bits are those of the constant plus the nearest integer.
+const WHOLE: f32 = 12_582_912.0;
 
 /// The geometry span that plays.
 ///
@@ -107,17 +112,22 @@ impl PieceCursor {
         // At the start of the path p0 is the position itself.
         let (origin, c0) = if l1 == 0 { (p0, 0.0) } else { (p1, c0) };
         let (base, rest) = split(origin);
-        self.forward = Cubic { base, power: [rest + c0, c1, 0.5 * s0, c3] };
-        let (base, rest) = split(p3);
-        self.backward = Cubic { base, power: [rest, -e2, 0.5 * s1, -c3] };
+        self.forward = Cubic::new(base, [rest + c0, c1, 0.5 * s0, c3]);
+        // It may only be needed where the path ends.
+        if l3 == 0 {
+            let (base, rest) = split(p3);
+            self.backward = Cubic::new(base, [rest, -e2, 0.5 * s1, -c3]);
+        }
     }
 
     /// The set-point at `path` from a place `offset` [u] into the geometry span.
+    #[inline]
     pub(crate) fn at(&self, offset: f32, path: PathState) -> Setpoint {
         self.forward.at(PathState { x: offset + path.x, ..path })
     }
 
     /// The set-point at `path` from the end of the table, on the last geometry span.
+    #[inline]
     pub(crate) fn before_end(&self, path: PathState) -> Setpoint {
         self.backward.at(path)
     }
@@ -168,14 +178,26 @@ impl PieceCursor {
 }
 
 impl Cubic {
+    fn new(base: i64, power: [f32; 4]) -> Self {
+        let [_, _, c2, c3] = power;
+        Self { base, power, steep: [2.0 * c2, 3.0 * c3, 6.0 * c3] }
+    }
+
+    #[inline]
     fn at(&self, path: PathState) -> Setpoint {
         let [c0, c1, c2, c3] = self.power;
+        let [d2, d3, e3] = self.steep;
         let PathState { x, speed, acceleration } = path;
         let offset = c0 + x * (c1 + x * (c2 + x * c3));
-        let first = c1 + x * (2.0 * c2 + x * (3.0 * c3));
-        let second = 2.0 * c2 + x * (6.0 * c3);
+        let first = c1 + x * (d2 + x * d3);
+        let second = d2 + x * e3;
+        // A piece stays within 3 2^20 counts of its base; the sum is exact to half a count, and bases are far from the ends.
+        let sum = offset + WHOLE;
+        let even = (sum.to_bits() as i32).wrapping_sub(WHOLE.to_bits() as i32);
+        // The sum goes to the even one of two; halves go up.
+        let whole = even.wrapping_add(i32::from(offset - (sum - WHOLE) >= 0.5));
         Setpoint {
-            position: self.base.saturating_add(i64::from(nearest(offset))),
+            position: self.base.wrapping_add(i64::from(whole)),
             velocity: first * speed,
             acceleration: second * speed * speed + first * acceleration,
             done: false,

@@ -51,6 +51,8 @@ pub enum Work {
     Span,
     /// A control tick: a table at rate 1.
     Tick,
+    /// A control tick in which a table begins or has ended.
+    End,
     /// A control tick at another rate.
     Override,
     /// A control tick off the path, and the one that plans it.
@@ -164,6 +166,8 @@ pub fn drive(
                 s = player.tick();
                 if fate == 2 && tick >= stop {
                     Work::Fallback
+                } else if tick == 0 || s.done {
+                    Work::End
                 } else if plain {
                     Work::Tick
                 } else {

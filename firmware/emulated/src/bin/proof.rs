@@ -52,8 +52,8 @@ fn counted(work: &mut dyn FnMut() -> Work) -> (Work, u32) {
 }
 
 /// Names of what is counted.
-const NAMES: [&str; 7] =
-    ["prove_per_span", "evaluate", "span", "tick", "tick_override", "tick_fallback", "plan"];
+const NAMES: [&str; 8] =
+    ["prove_per_span", "evaluate", "span", "tick", "tick_end", "tick_override", "tick_fallback", "plan"];
 
 fn place(work: Work) -> usize {
     match work {
@@ -61,9 +61,10 @@ fn place(work: Work) -> usize {
         Work::Evaluate => 1,
         Work::Span => 2,
         Work::Tick => 3,
-        Work::Override => 4,
-        Work::Fallback => 5,
-        Work::Plan => 6,
+        Work::End => 4,
+        Work::Override => 5,
+        Work::Fallback => 6,
+        Work::Plan => 7,
     }
 }
 
@@ -82,7 +83,7 @@ fn main() -> ! {
         timer.enable_counter();
     }
     let (_, empty) = counted(&mut || Work::Plan);
-    let mut costs: [Cost; 7] = Default::default();
+    let mut costs: [Cost; 8] = Default::default();
     let mut note = |work: &mut dyn FnMut() -> Work| {
         let (what, counts) = counted(work);
         let counts = counts.saturating_sub(empty);
