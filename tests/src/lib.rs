@@ -1,6 +1,7 @@
 //! Oracles, generators and shared pieces of the whole-product suites.
 
 pub mod chain;
+pub mod drives;
 pub mod judge;
 pub mod meander;
 pub mod oracle;

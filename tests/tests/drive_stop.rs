@@ -1,71 +1,14 @@
 //! A quick stop at any instant of any table, and faults on the way: the axis comes to rest within its limits.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests fail as tests do")]
 
-use firmware_core::axis::AxisConfig;
-use firmware_core::evaluate::{Cursor, Setpoint};
+use firmware_core::evaluate::Setpoint;
 use firmware_core::player::Player;
-use firmware_core::table::TableView;
-use planner::feed::pack::Packed;
-use protocol::message::{DriveMessage, HostMessage, Part, Reject, State};
-use protocol::power::PowerEvent;
+use protocol::message::{DriveMessage, HostMessage, Reject, State};
 use protocol::table::Limits;
+use tests::drives::{asked, bring, limits_of, player};
 use tests::tables::{COARSE, FINE, Random, Sample, TICK_NS};
 
 const TICK_S: f64 = TICK_NS as f64 * 1e-9;
-
-/// A random table whose declared limits are what it needs, and a quarter more; those of its axis are the same.
-fn sample(random: &mut Random) -> (Packed, Limits) {
-    let kind = if random.whole(0, 1) == 0 { FINE } else { COARSE };
-    let mut packed = Sample::new(random, kind).packed(1).unwrap();
-    let part = &packed.axes[0];
-    let view = TableView::new(&packed.header, &part.header, &packed.shared, &part.controls).unwrap();
-    let table = view.check().unwrap();
-    let mut cursor = Cursor::new(&table).unwrap();
-    let (mut time, mut most) = (0u64, [0.0f32; 3]);
-    let mut before: Option<(u32, u64, f32)> = None;
-    while time < table.duration() {
-        let now = cursor.evaluate(&table, time).unwrap();
-        most = [most[0].max(now.velocity.abs()), most[1].max(now.acceleration.abs()), most[2]];
-        if let Some((span, then, old)) = before
-            && span == cursor.span()
-        {
-            let seconds = (time - then) as f32 / (1u64 << 32) as f32;
-            most[2] = most[2].max((now.acceleration - old).abs() / seconds);
-        }
-        before = Some((cursor.span(), time, now.acceleration));
-        time += (cursor.duration() / 12).max(1);
-    }
-    let [velocity, acceleration, jerk] = most.map(|most| 1.25 * most.max(1.0));
-    // An axis without a limit of jerk is soft by itself.
-    let jerk = (random.whole(0, 1) == 0).then_some(jerk);
-    let limits = Limits { velocity, acceleration, jerk };
-    packed.axes[0].header.limits = limits;
-    (packed, limits)
-}
-
-fn bring(player: &mut Player<'_>, packed: &Packed) -> bool {
-    let part = &packed.axes[0];
-    let table = packed.header.table;
-    player.handle(&HostMessage::Open(packed.header));
-    player.handle(&HostMessage::OpenAxis(part.header));
-    for (kind, bytes, crc) in
-        [(Part::Shared, &packed.shared, packed.shared_crc()), (Part::Axis, &part.controls, part.crc())]
-    {
-        for (k, bytes) in bytes.chunks(300).enumerate() {
-            player.handle(&HostMessage::Data { table, part: kind, offset: 300 * k as u32, bytes });
-        }
-        player.handle(&HostMessage::Seal { table, part: kind, crc });
-    }
-    matches!(player.poll_answer(), Some(DriveMessage::Ready { .. }))
-}
-
-fn player<'a>(packed: &Packed, limits: Limits, a: &'a mut [u8], b: &'a mut [u8]) -> Player<'a> {
-    let config = AxisConfig { position: packed.axes[0].header.start, ..AxisConfig::new(0, TICK_NS, limits) };
-    let mut player = Player::new(config, a, b);
-    player.handle(&HostMessage::Power(PowerEvent::Shutdown));
-    player.handle(&HostMessage::Power(PowerEvent::EnableOperation));
-    player
-}
 
 /// The set-points after a quick stop keep limits and follow each other; returns where they end.
 fn assert_lands(player: &mut Player<'_>, before: Setpoint, limits: &Limits, jerk: f64) -> i64 {
@@ -99,18 +42,20 @@ fn assert_lands(player: &mut Player<'_>, before: Setpoint, limits: &Limits, jerk
 /// `FEEDSPLINE_CASES` asks for so many instants, `FEEDSPLINE_SEED` for others.
 #[test]
 fn a_quick_stop_at_any_instant_ends_at_rest_within_limits() {
-    let asked = |name, default| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default);
     let (cases, seed): (u64, u64) = (asked("FEEDSPLINE_CASES", 3_000), asked("FEEDSPLINE_SEED", 1));
     let mut random = Random::new(seed);
     let (mut moving, mut refused) = (0u64, 0u64);
     while moving < cases {
-        let (packed, limits) = sample(&mut random);
+        let kind = if random.whole(0, 1) == 0 { FINE } else { COARSE };
+        let mut packed = Sample::new(&mut random, kind).packed(1).unwrap();
+        let limits = limits_of(&packed, 0, random.whole(0, 1) == 0);
+        packed.axes[0].header.limits = limits;
         let soft = f64::from(limits.acceleration) / (4.0 * TICK_S);
         let jerk = limits.jerk.map_or(soft, f64::from);
         for _ in 0..20 {
             let (mut a, mut b) = (vec![0; 8192], vec![0; 8192]);
-            let mut player = player(&packed, limits, &mut a, &mut b);
-            if !bring(&mut player, &packed) {
+            let mut player = player(&packed, 0, limits, &mut a, &mut b);
+            if !bring(&mut player, &packed, 0) {
                 // Jerk may be larger between the places where it was looked at.
                 refused += 1;
                 break;
