@@ -93,22 +93,49 @@ impl Cursor {
         Ok(self.piece.before_end(self.law.at(left)))
     }
 
+    /// Goes on to the span of a time, but not beyond the knot before span `knot`; whether the time has reached it.
+    pub(crate) fn approach(
+        &mut self,
+        table: &CheckedTable<'_>,
+        time: u64,
+        knot: u32,
+    ) -> Result<bool, TableError> {
+        while !self.law.is_last() && time.saturating_sub(self.began) >= self.law.duration() {
+            if self.law.index().wrapping_add(1) == knot {
+                return Ok(true);
+            }
+            self.step(table)?;
+        }
+        Ok(false)
+    }
+
+    /// The start of a table that goes on where this one is, at the end of its span.
+    pub(crate) fn joined(&self, table: &CheckedTable<'_>) -> Result<Self, TableError> {
+        Ok(Self { began: self.began.saturating_add(self.law.duration()), ..Self::new(table)? })
+    }
+
     /// Goes on to the span of a time.
     #[inline(never)]
     fn pass(&mut self, table: &CheckedTable<'_>, time: u64) -> Result<(), TableError> {
-        let view = table.view();
         while !self.law.is_last() && time.saturating_sub(self.began) >= self.law.duration() {
-            self.began = self.began.saturating_add(self.law.duration());
-            let step = self.law.step();
-            self.law.advance(view)?;
-            if self.law.opens_geometry() {
-                self.piece.advance(view)?;
-                self.offset = 0;
-            } else {
-                self.offset = self.offset.saturating_add(step);
-            }
-            self.offset_u = self.offset as f32 * view.header.step();
+            self.step(table)?;
         }
+        Ok(())
+    }
+
+    /// Goes on by a span.
+    fn step(&mut self, table: &CheckedTable<'_>) -> Result<(), TableError> {
+        let view = table.view();
+        self.began = self.began.saturating_add(self.law.duration());
+        let step = self.law.step();
+        self.law.advance(view)?;
+        if self.law.opens_geometry() {
+            self.piece.advance(view)?;
+            self.offset = 0;
+        } else {
+            self.offset = self.offset.saturating_add(step);
+        }
+        self.offset_u = self.offset as f32 * view.header.step();
         Ok(())
     }
 

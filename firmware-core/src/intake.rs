@@ -199,6 +199,7 @@ impl<'a> Intake<'a> {
             Ok(DriveMessage::Ready { table: number, ticks, crc })
         };
         let result = self.incoming(number, fits);
+        let result = if self.joins(number) { result } else { result.and(Err(Reject::Joint)) };
         match result {
             Ok(ready) => {
                 self.answer(ready);
@@ -211,6 +212,14 @@ impl<'a> Intake<'a> {
                 Err(reason)
             }
         }
+    }
+
+    /// A table that joins another one goes on where that one is left; others need not.
+    fn joins(&self, number: u32) -> bool {
+        let with = |number: u32| self.slots.iter().find(|slot| slot.number() == Some(number));
+        let Some(slot) = with(number) else { return true };
+        let joint = slot.headers().and_then(|(header, _)| header.joint);
+        joint.is_none_or(|joint| with(joint.table).is_some_and(|other| slot.follows(other)))
     }
 
     /// Hands a table over, to be played from a tick on.

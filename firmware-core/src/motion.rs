@@ -1,6 +1,7 @@
 //! The half of a drive that moves: one set-point per control tick, whatever happens.
 //!
-//! Every table ends at rest, so whatever fails to arrive, the axis comes to rest on its path. An override changes the rate
+//! Every table ends at rest, so whatever fails to arrive, the axis comes to rest on its path: the next piece of a motion takes
+//! over from the way to rest of the piece before, at a knot and to the bit, or it does not. An override changes the rate
 //! of path time, down to a hold, on the path. A quick stop, a table that is not what was checked, or a set-point beyond the
 //! axis' limits leaves the path: the axis comes to rest by a double-S from the set-point before, within its limits. Faults
 //! stay latched with their first cause. At rest the axis may be sent to a position or a velocity.
@@ -44,8 +45,23 @@ struct Playing<'a> {
     table: Loaded<'a>,
     cursor: Cursor,
     clock: PathClock,
+    /// Where the table's own time begins on that clock [2^-32 s]: later than 0 if it has taken over from another one.
+    began: u64,
     /// Tick at which it will have come to rest, if the rate is 1 from now on.
     end: u64,
+}
+
+impl Playing<'_> {
+    /// Path time at which it will have come to rest.
+    fn until(&self) -> u64 {
+        self.began.saturating_add(self.table.duration())
+    }
+
+    /// Tick at which motion ends that goes on until another path time.
+    fn end_after(&self, until: u64, tick_ns: u32) -> u64 {
+        let [now, then] = [self.until(), until].map(|time| ticks_until(time, tick_ns));
+        self.end.saturating_add(then).saturating_sub(now)
+    }
 }
 
 /// A table that will start.
@@ -90,6 +106,8 @@ pub struct Motion<'a> {
     excursion: Option<Excursion>,
     playing: Option<Playing<'a>>,
     armed: Option<Armed<'a>>,
+    /// A table that takes over from the one that plays, or is armed.
+    heir: Option<Loaded<'a>>,
     rate: Rate,
     change: Option<Change>,
     /// Path time lost by rates below 1 that is not yet a whole tick [2^-32 s].
@@ -117,6 +135,7 @@ impl<'a> Motion<'a> {
             excursion: None,
             playing: None,
             armed: None,
+            heir: None,
             rate: Rate::default(),
             change: None,
             lag: 0,
@@ -206,6 +225,12 @@ impl<'a> Motion<'a> {
         let strays =
             |way: &Excursion| way.course.left().map_or(u64::MAX, |left| self.tick.saturating_add(left));
         let end = self.excursion.as_ref().map(strays).or(self.armed.as_ref().map(armed));
+        let inherited = |heir: &Loaded<'_>| {
+            let playing = self.playing.as_ref()?;
+            let until = playing.began.saturating_add(playing.table.tail()?).saturating_add(heir.duration());
+            Some(playing.end_after(until, tick_ns))
+        };
+        let end = end.or(self.heir.as_ref().and_then(inherited));
         let end = end.or(self.playing.as_ref().map(|p| p.end)).unwrap_or(self.tick);
         Status {
             state: self.state(),
@@ -235,21 +260,19 @@ impl<'a> Motion<'a> {
     fn obey(&mut self, order: Order<'a>) -> (u32, Result<(), Reject>, bool) {
         match order {
             Order::Start { table, tick } => {
-                let number = table.number();
-                match self.may_start(&table, tick) {
-                    Ok(()) => {
-                        self.armed = Some(Armed { table, tick });
-                        (number, Ok(()), false)
-                    }
-                    Err(reason) => {
-                        self.give_back(table, true);
-                        (number, Err(reason), false)
-                    }
+                let (number, joins) = (table.number(), table.header().joint.is_some());
+                let allowed = if joins { self.may_inherit(&table) } else { self.may_start(&table, tick) };
+                match allowed {
+                    Ok(()) if joins => self.heir = Some(table),
+                    Ok(()) => self.armed = Some(Armed { table, tick }),
+                    Err(_) => self.give_back(table, true),
                 }
+                (number, allowed, false)
             }
             Order::StartAgain { table, tick } => {
                 let plays = self.playing.as_ref().is_some_and(|p| p.table.number() == table);
-                let waits = self.armed.as_ref().is_some_and(|a| a.table.number() == table && a.tick == tick);
+                let waits = self.armed.as_ref().is_some_and(|a| a.table.number() == table && a.tick == tick)
+                    || self.heir.as_ref().is_some_and(|heir| heir.number() == table);
                 let reason = if self.armed.is_some() { Reject::Busy } else { Reject::NotReady };
                 (table, if plays || waits { Ok(()) } else { Err(reason) }, false)
             }
@@ -269,7 +292,7 @@ impl<'a> Motion<'a> {
     #[inline(never)]
     fn may_start(&self, table: &Loaded<'_>, tick: u64) -> Result<(), Reject> {
         self.refuse_without_torque()?;
-        if self.excursion.is_some() || self.armed.is_some() {
+        if self.excursion.is_some() || self.armed.is_some() || self.heir.is_some() {
             return Err(Reject::Busy);
         }
         if tick < self.tick {
@@ -287,6 +310,24 @@ impl<'a> Motion<'a> {
             return Err(Reject::Override);
         }
         Ok(())
+    }
+
+    /// Whether a table may take over from the one that it names: that one plays or is armed, and its tail has not begun.
+    #[inline(never)]
+    fn may_inherit(&self, table: &Loaded<'_>) -> Result<(), Reject> {
+        self.refuse_without_torque()?;
+        if self.heir.is_some() || (self.playing.is_some() && self.armed.is_some()) {
+            return Err(Reject::Busy);
+        }
+        let named = table.header().joint.map(|joint| joint.table);
+        let armed = self.armed.as_ref().is_some_and(|armed| Some(armed.table.number()) == named);
+        let playing = self.playing.as_ref().filter(|playing| Some(playing.table.number()) == named);
+        match playing.and_then(|p| Some((p, p.table.header().tail?))) {
+            Some((p, tail)) if p.cursor.span() < tail => Ok(()),
+            Some(_) => Err(Reject::Late { tick: self.tick }),
+            None if armed => Ok(()),
+            None => Err(Reject::NotReady),
+        }
     }
 
     /// Sets out for a position, from rest or from the way to another one.
@@ -426,7 +467,7 @@ impl<'a> Motion<'a> {
     /// When the table before it is at its end, the armed table becomes the one that plays.
     #[inline(never)]
     fn begin(&mut self) -> Result<(), Fault> {
-        let free = self.playing.as_ref().is_none_or(|p| p.clock.time() >= p.table.duration());
+        let free = self.playing.as_ref().is_none_or(|p| p.clock.time() >= p.until());
         if !free {
             return Ok(());
         }
@@ -450,11 +491,37 @@ impl<'a> Motion<'a> {
         self.rate.jump();
         self.lag = 0;
         let clock = PathClock::new(self.config.tick_ns);
-        self.playing = Some(Playing { table, cursor, clock, end: self.tick.saturating_add(ticks) });
+        let end = self.tick.saturating_add(ticks);
+        self.playing = Some(Playing { table, cursor, clock, began: 0, end });
+        Ok(())
+    }
+
+    /// Lets the heir take over when its time has come.
+    #[inline(never)]
+    fn inherit(&mut self) -> Result<(), Fault> {
+        let (Some(playing), Some(heir)) = (&mut self.playing, &self.heir) else { return Ok(()) };
+        let (Some(here), Some(next)) = (playing.table.table(), heir.table()) else { return Ok(()) };
+        let Some(tail) = here.header().tail else { return Ok(()) };
+        let fault = |error| Fault::Table { table: here.header().table, error };
+        if !playing.cursor.approach(&here, playing.clock.time(), tail).map_err(fault)? {
+            return Ok(());
+        }
+        let joined = playing.cursor.joined(&next);
+        let cursor = joined.map_err(|error| Fault::Table { table: next.header().table, error })?;
+        let until = cursor.began().saturating_add(next.duration());
+        playing.end = playing.end_after(until, self.config.tick_ns);
+        (playing.cursor, playing.began) = (cursor, cursor.began());
+        if let Some(heir) = self.heir.take() {
+            let before = core::mem::replace(&mut playing.table, heir);
+            self.give_back(before, false);
+        }
         Ok(())
     }
 
     fn play(&mut self) -> Result<Setpoint, Fault> {
+        if self.heir.is_some() {
+            self.inherit()?;
+        }
         let Some(playing) = &mut self.playing else {
             self.rate.jump();
             return Ok(Setpoint::at_rest(self.last.position));
@@ -579,6 +646,9 @@ impl<'a> Motion<'a> {
     fn disarm(&mut self) {
         if let Some(armed) = self.armed.take() {
             self.give_back(armed.table, false);
+        }
+        if let Some(heir) = self.heir.take() {
+            self.give_back(heir, false);
         }
     }
 

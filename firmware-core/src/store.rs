@@ -3,7 +3,7 @@
 use protocol::message::{Part, Reject, part_crc};
 use protocol::table::{AxisHeader, TableHeader};
 
-use crate::table::{CheckedTable, TableView};
+use crate::table::{CheckedTable, TableView, Tail};
 
 /// A buffer and what is known of the table in it; without its memory while the motion has it.
 #[derive(Debug)]
@@ -20,8 +20,17 @@ struct Table {
     axis: Option<AxisHeader>,
     shared: Progress,
     controls: Progress,
-    /// Duration [2^-32 s] once the table was checked.
-    checked: Option<u64>,
+    /// Once the table was checked.
+    checked: Option<Checked>,
+}
+
+/// What the check of a table has found.
+#[derive(Clone, Copy, Debug)]
+struct Checked {
+    /// How long it plays [2^-32 s].
+    duration: u64,
+    /// Where another one may take over.
+    tail: Option<Tail>,
 }
 
 /// How far a part has come.
@@ -39,6 +48,8 @@ pub struct Loaded<'a> {
     header: TableHeader,
     axis: AxisHeader,
     duration: u64,
+    /// Path time at which another table may take over [2^-32 s].
+    tail: Option<u64>,
 }
 
 impl<'a> Loaded<'a> {
@@ -60,6 +71,11 @@ impl<'a> Loaded<'a> {
     /// How long it plays [2^-32 s].
     pub(crate) fn duration(&self) -> u64 {
         self.duration
+    }
+
+    /// Path time, from its start, at which another table may take over [2^-32 s].
+    pub(crate) fn tail(&self) -> Option<u64> {
+        self.tail
     }
 
     /// The table; there always is one.
@@ -110,11 +126,12 @@ impl<'a> Slot<'a> {
 
     /// Gives a checked table away; the slot keeps its number.
     pub(crate) fn give(&mut self) -> Option<Loaded<'a>> {
-        let Table { header, axis: Some(axis), checked: Some(duration), .. } = self.table? else {
+        let Table { header, axis: Some(axis), checked: Some(checked), .. } = self.table? else {
             return None;
         };
         let memory = self.memory.take()?;
-        Some(Loaded { memory, header, axis, duration })
+        let tail = checked.tail.map(|tail| tail.time);
+        Some(Loaded { memory, header, axis, duration: checked.duration, tail })
     }
 
     /// Takes its memory back; the table is still there if it is to be `kept`.
@@ -194,11 +211,24 @@ impl<'a> Slot<'a> {
 
     /// Checks a complete table, and proves that it keeps its limits and stays within `travel`; its duration [2^-32 s].
     pub(crate) fn check(&mut self, travel: Option<[i64; 2]>) -> Result<u64, Reject> {
-        let duration = self.view().ok_or(Reject::NotOpen)?.prove(travel).map_err(Reject::Table)?.duration();
+        let (table, tail) = self.view().ok_or(Reject::NotOpen)?.prove_all(travel).map_err(Reject::Table)?;
+        let duration = table.duration();
         if let Some(table) = &mut self.table {
-            table.checked = Some(duration);
+            table.checked = Some(Checked { duration, tail });
         }
         Ok(duration)
+    }
+
+    /// Whether the table in it, which joins another one, goes on where that one is left.
+    pub(crate) fn follows(&self, other: &Slot<'_>) -> bool {
+        let (Some(here), Some(there)) = (&self.table, &other.table) else { return false };
+        let (Some(axis), Some(other_axis)) = (&here.axis, &there.axis) else { return false };
+        let (h, o) = (&here.header, &there.header);
+        let alike = (h.q_scale, h.step_exponent, h.tick_ns, h.warp, axis.fraction_bits)
+            == (o.q_scale, o.step_exponent, o.tick_ns, o.warp, other_axis.fraction_bits);
+        let left = there.checked.and_then(|checked| checked.tail).map(|tail| tail.junction);
+        let joins = self.view().and_then(|view| view.junction());
+        alike && left.is_some() && left == joins
     }
 
     /// Both headers of a table that is coming in.

@@ -27,6 +27,23 @@ pub struct CheckedTable<'a> {
     duration: u64,
 }
 
+/// What motion at a knot depends on: tables that agree in it can follow each other there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Junction {
+    /// Length and code of the q spans before and behind it.
+    spans: [[u32; 2]; 2],
+    lengths: [u32; 4],
+    points: [i64; 3],
+}
+
+/// Where another table may take over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Tail {
+    pub(crate) junction: Junction,
+    /// Path time there [2^-32 s].
+    pub(crate) time: u64,
+}
+
 impl<'a> TableView<'a> {
     /// Puts a table together from its headers, its shared streams (geometry, then spans) and its control stream.
     ///
@@ -71,7 +88,7 @@ impl<'a> TableView<'a> {
     /// # Errors
     /// The first rule that is broken, and where.
     pub fn check(self) -> Result<CheckedTable<'a>, TableError> {
-        self.pass(|_, _, _| Ok(()))
+        self.pass(|_, _, _| Ok(())).map(|(table, _)| table)
     }
 
     /// As [`TableView::check`], and proves on the way that the axis keeps the limits that the table declares, at every
@@ -80,6 +97,15 @@ impl<'a> TableView<'a> {
     /// # Errors
     /// The first rule that is broken, or the first span on which a limit cannot be proven ([`crate::proof`]).
     pub fn prove(self, travel: Option<[i64; 2]>) -> Result<CheckedTable<'a>, TableError> {
+        self.prove_all(travel).map(|(table, _)| table)
+    }
+
+    /// The same, and where another table may take over.
+    #[inline(never)]
+    pub(crate) fn prove_all(
+        self,
+        travel: Option<[i64; 2]>,
+    ) -> Result<(CheckedTable<'a>, Option<Tail>), TableError> {
         let granted = Granted::new(&self.axis.limits, self.header.margin);
         self.pass(|law, piece, offset| {
             let failed = |limit| TableError::Limit { limit, index: law.index() };
@@ -104,7 +130,7 @@ impl<'a> TableView<'a> {
     fn pass(
         self,
         judge: impl Fn(&LawCursor, &PieceCursor, f32) -> Result<(), TableError>,
-    ) -> Result<CheckedTable<'a>, TableError> {
+    ) -> Result<(CheckedTable<'a>, Option<Tail>), TableError> {
         let shortest = tick_time(self.header.tick_ns) / MAX_SPANS_PER_TICK;
         let mut piece = PieceCursor::start(&self)?;
         if nearest_count(piece.first_point(), self.axis.fraction_bits) != self.axis.start {
@@ -112,7 +138,17 @@ impl<'a> TableView<'a> {
         }
         let mut law = LawCursor::start(&self)?;
         let (mut duration, mut offset) = (0u64, 0u32);
+        let (mut tail, mut before) = (None, [0; 2]);
         loop {
+            if self.header.tail == Some(law.index()) {
+                if !law.opens_geometry() {
+                    return Err(TableError::Header(HeaderField::Tail));
+                }
+                let (lengths, points) = piece.start_of_span();
+                let junction = Junction { spans: [before, law.span()], lengths, points };
+                tail = Some(Tail { junction, time: duration });
+            }
+            before = law.span();
             if law.duration() < shortest {
                 return Err(TableError::Fast { index: law.index() });
             }
@@ -138,7 +174,15 @@ impl<'a> TableView<'a> {
         if duration == u64::MAX {
             return Err(TableError::Count { stream: Stream::Spans });
         }
-        Ok(CheckedTable { view: self, duration })
+        Ok((CheckedTable { view: self, duration }, tail))
+    }
+
+    /// Where it takes over from another table, if it does.
+    pub(crate) fn junction(&self) -> Option<Junction> {
+        let joint = self.header.joint.as_ref()?;
+        let law = LawCursor::start(self).ok()?;
+        let (lengths, points) = PieceCursor::start(self).ok()?.start_of_span();
+        Some(Junction { spans: [[joint.step, joint.code], law.span()], lengths, points })
     }
 }
 

@@ -12,7 +12,7 @@ use crate::table::{AxisHeader, AxisLimit, Limits, TableError, TableHeader};
 pub const DATA_BYTES: usize = 312;
 
 /// Room for any header, as postcard.
-pub const HEADER_BYTES: usize = 96;
+pub const HEADER_BYTES: usize = 128;
 
 /// From the host.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,7 +43,8 @@ pub enum HostMessage<'a> {
         /// CRC-32C over the part's header, as postcard, and its bytes.
         crc: u32,
     },
-    /// The table starts to play at this tick of the drives' common count.
+    /// The table starts to play at this tick of the drives' common count. A table that joins another one starts where that one
+    /// is left, and the tick is not looked at.
     Start {
         /// Which table.
         table: u32,
@@ -279,6 +280,8 @@ pub enum Reject {
     Moves,
     /// The table does not admit this rate, or no change of it.
     Override,
+    /// The table does not go on where the table is left that it names.
+    Joint,
 }
 
 /// Why a message could not be written or read.

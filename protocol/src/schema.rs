@@ -5,7 +5,8 @@ use crate::checksum::Fnv64;
 /// All messages and streams in their order on the wire. Whoever changes one of them changes this text.
 pub const SCHEMA: &str = "\
 TableHeader{version u8,table u32,spans u32,geometry_spans u32,step_exponent i8,q_scale f32,tick_ns u32,\
-geometry_bytes u32,span_bytes u32,margin u8,warp ?Warp}\
+geometry_bytes u32,span_bytes u32,margin u8,warp ?Warp,joint ?Joint,tail ?u32}\
+Joint{table u32,step u32,code u32,lengths [u32;2]}\
 Warp{rate u32,acceleration u32,jerk u32,slope u64,bend u64}\
 AxisHeader{table u32,axis u8,fraction_bits u8,start i64,end i64,limits Limits,control_bytes u32}\
 Limits{velocity f32,acceleration f32,jerk ?f32}\
@@ -24,9 +25,9 @@ Power[SwitchOnDisabled,ReadyToSwitchOn,SwitchedOn,OperationEnabled,QuickStopActi
 PowerEvent[Shutdown,SwitchOn,EnableOperation,DisableOperation,DisableVoltage,QuickStop,ResetFault,Fault,Stopped]\
 Reject[Table TableError,Checksum Part,Incomplete{part Part,received u32},NoRoom{needed u64,available u64},\
 Tick{tick_ns u32},Axis{axis u8},Limits,Position{position i64},Busy,NotOpen,NotReady,Late{tick u64},\
-Overlap{tick u64},Fault,Target,Power Power,Moves,Override]\
+Overlap{tick u64},Fault,Target,Power Power,Moves,Override,Joint]\
 Stream[Geometry,Spans,Controls]\
-HeaderField[Version,Table,Spans,GeometrySpans,StepExponent,QScale,Tick,Length,FractionBits,Limits,Margin,Warp]\
+HeaderField[Version,Table,Spans,GeometrySpans,StepExponent,QScale,Tick,Length,FractionBits,Limits,Margin,Warp,Joint,Tail]\
 TableError[Header HeaderField,Truncated{stream,index u32},Malformed{stream,index u32},\
 Range{stream,index u32},LeftOver{stream},Overfull{index u32},Count{stream},Bend{index u32},Slow{index u32},\
 Fast{index u32},ControlStep{index u32},Start,End,Limit{limit AxisLimit,index u32}]\

@@ -15,7 +15,7 @@ pub mod span;
 pub mod warp;
 
 pub use error::{AxisLimit, HeaderField, Stream, TableError};
-pub use header::{AxisHeader, FORMAT_VERSION, Limits, TableHeader};
+pub use header::{AxisHeader, FORMAT_VERSION, Joint, Limits, TableHeader};
 pub use warp::Warp;
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use planner::feed::pack::Packed;
 use planner::job::machine::OverrideRule;
 use protocol::message::{HostMessage, State};
 use protocol::table::Limits;
-use protocol::table::warp::ONE;
+use protocol::table::warp::{ONE, RATE_ONE};
 use tests::drives::{asked, bring, limits_of, player};
 use tests::tables::{COARSE, FINE, Random, Sample, TICK_NS};
 
@@ -127,7 +127,10 @@ fn all_axes_are_held_on_the_path_and_go_on_to_its_end() {
         let Some((packed, limits)) = sample(&mut random) else { continue };
         let duration = table(&packed, 0).duration();
         let ticks = (duration as f64 / (1u64 << 32) as f64 / TICK_S) as u64;
-        if ticks > 20_000 {
+        // What the slowest change of the rate takes, twice.
+        let bounds = packed.header.warp.unwrap();
+        let patience = 2 * (RATE_ONE / bounds.climb() + bounds.climb() / bounds.bend) + 1_000;
+        if ticks > 20_000 || patience > 30_000 {
             continue;
         }
         let tick = random.whole(0, ticks);
@@ -137,7 +140,6 @@ fn all_axes_are_held_on_the_path_and_go_on_to_its_end() {
             Change { permille: random.whole(0, 1000) as u16, tick: tick + random.whole(1, 300) },
             Change { permille: 1000, tick: tick + 301 + random.whole(1, 500) },
         ];
-        let patience = 12_000;
         match play(&packed, &limits, &hold, tick + patience) {
             Some(held) => holds += u64::from(held),
             None => refused += 1,

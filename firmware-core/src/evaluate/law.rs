@@ -10,7 +10,7 @@
 
 use protocol::table::rules::{MAX_BEND, MAX_SPAN_TIME, PATH_TIME_PER_S};
 use protocol::table::span::{Span, SpanReader};
-use protocol::table::{Stream, TableError};
+use protocol::table::{Joint, Stream, TableError};
 
 use crate::math::{a_series, g_series, s_series, sqrt};
 use crate::proof::{Rest, Speed};
@@ -51,6 +51,23 @@ pub(crate) enum Stretch {
     Landing(Rest),
 }
 
+/// Where two spans of q's spline meet.
+#[derive(Clone, Copy, Debug)]
+struct Knot {
+    q: f32,
+    /// Half of dq/du.
+    slope: f32,
+}
+
+impl Knot {
+    /// Between control values, each with the length of its span.
+    #[inline]
+    fn between(c0: f32, h0: f32, c1: f32, h1: f32) -> Self {
+        let both = h0 + h1;
+        Self { q: (c0 * h1 + c1 * h0) / both, slope: (c1 - c0) / both }
+    }
+}
+
 /// The span that plays, and what the next one needs to know.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LawCursor {
@@ -73,9 +90,12 @@ pub(crate) struct LawCursor {
 impl LawCursor {
     /// The first span.
     pub(crate) fn start(view: &TableView<'_>) -> Result<Self, TableError> {
-        let mut reader = SpanReader::new(view.header.spans);
+        let mut reader = SpanReader::new(view.header.spans, view.header.joint.is_some());
         let [here, next, after] =
             [read(&mut reader, view)?, read(&mut reader, view)?, read(&mut reader, view)?];
+        if let Some(joint) = &view.header.joint {
+            return Self::join(view, reader, joint, [here, next, after]);
+        }
         let h = length(view, here);
         let q = value(view, next);
         let slope = (2.0 / 3.0) * q / h;
@@ -99,15 +119,50 @@ impl LawCursor {
         blank.lasting(3.0 * h / speed)
     }
 
+    /// The first span of a table that goes on where another one is left.
+    #[inline(never)]
+    fn join(
+        view: &TableView<'_>,
+        reader: SpanReader,
+        joint: &Joint,
+        [here, next, after]: [Span; 3],
+    ) -> Result<Self, TableError> {
+        let before = Span { step: joint.step, code: joint.code, opens_geometry: false };
+        let (h0, h1) = (length(view, before), length(view, here));
+        let knot = Knot::between(value(view, before), h0, value(view, here), h1);
+        let mut cursor = Self {
+            reader,
+            index: u32::MAX,
+            here: before,
+            next: here,
+            after: next,
+            law: Law::Quadratic { v0: 0.0, d: 0.0, gamma: 0.0 },
+            duration: 0,
+            scale: 0.0,
+            shift: 0,
+            control: value(view, here),
+            slope: knot.slope,
+            speed: sqrt(knot.q),
+        };
+        cursor.enter(view, after)?;
+        Ok(cursor)
+    }
+
     /// Goes to the next span; stays on the last one.
     pub(crate) fn advance(&mut self, view: &TableView<'_>) -> Result<(), TableError> {
         if self.is_last() {
             return Ok(());
         }
-        let index = self.index.saturating_add(1);
         let after = self.reader.next(view.geometry, view.spans)?;
-        (self.index, self.here, self.next) = (index, self.next, self.after);
-        self.after = after.unwrap_or_default();
+        self.enter(view, after.unwrap_or_default())
+    }
+
+    /// Goes to the next span; `after` is the second one behind it.
+    #[inline]
+    fn enter(&mut self, view: &TableView<'_>, after: Span) -> Result<(), TableError> {
+        // The span before the first one of a table that joins has number -1.
+        let index = self.index.wrapping_add(1);
+        (self.index, self.here, self.next, self.after) = (index, self.next, self.after, after);
         let h = length(view, self.here);
         let (v0, d0) = (self.speed, self.slope);
         let left = self.reader_left(view);
@@ -125,9 +180,9 @@ impl LawCursor {
             let code = value(view, self.next);
             self.control =
                 if left == 2 { code + h1 * ((2.0 / 3.0) * code / length(view, self.after)) } else { code };
-            let both = h + h1;
-            self.slope = (self.control - control) / both;
-            q1 = (control * h1 + self.control * h) / both;
+            let knot = Knot::between(control, h, self.control, h1);
+            self.slope = knot.slope;
+            q1 = knot.q;
         }
         self.speed = sqrt(q1);
         let gamma = (self.slope - d0) / h;
@@ -143,7 +198,7 @@ impl LawCursor {
 
     /// Spans behind this one.
     fn reader_left(&self, view: &TableView<'_>) -> u32 {
-        view.header.spans.saturating_sub(self.index.saturating_add(1))
+        view.header.spans.saturating_sub(self.index.wrapping_add(1))
     }
 
     /// The same with a duration [s].
@@ -209,6 +264,11 @@ impl LawCursor {
     /// A geometry span begins with it.
     pub(crate) fn opens_geometry(&self) -> bool {
         self.here.opens_geometry
+    }
+
+    /// Its length [grid steps] and its code.
+    pub(crate) fn span(&self) -> [u32; 2] {
+        [self.here.step, self.here.code]
     }
 
     /// It is the landing.

@@ -51,6 +51,10 @@ impl PieceCursor {
             forward: Cubic::default(),
             backward: Cubic::default(),
         };
+        if let Some(joint) = &view.header.joint {
+            let [a, b] = joint.lengths;
+            cursor.lengths = [0, 0, 0, a, b];
+        }
         cursor.points[3] = cursor.controls.next(view.controls)?;
         for _ in 0..2 {
             cursor.next_point(view)?;
@@ -157,6 +161,14 @@ impl PieceCursor {
     /// The first control point, before the first [`PieceCursor::advance`].
     pub(crate) fn first_point(&self) -> i64 {
         self.points[0]
+    }
+
+    /// What the start of the geometry span depends on: lengths of it, of the one behind and of the two before it, and three
+    /// control points.
+    pub(crate) fn start_of_span(&self) -> ([u32; 4], [i64; 3]) {
+        let [a, b, c, d, _] = self.lengths;
+        let [p, q, r, _] = self.points;
+        ([a, b, c, d], [p, q, r])
     }
 
     /// The last control point read.

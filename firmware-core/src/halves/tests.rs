@@ -48,6 +48,8 @@ fn table(number: u32, back: bool) -> Vec<Vec<Frame>> {
         span_bytes: spans.len() as u32,
         margin: 5,
         warp: None,
+        joint: None,
+        tail: None,
     };
     shared.extend(spans);
     let axis = AxisHeader {

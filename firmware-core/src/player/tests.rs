@@ -51,6 +51,8 @@ fn header(table: u32, geometry_bytes: u32, span_bytes: u32) -> TableHeader {
         span_bytes,
         margin: 5,
         warp: Some(WARP),
+        joint: None,
+        tail: None,
     }
 }
 

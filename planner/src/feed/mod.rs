@@ -1,5 +1,6 @@
 //! The feed table: what is certified, simulated, stored and sent.
 
+pub mod chunk;
 pub mod file;
 pub mod job;
 pub mod messages;

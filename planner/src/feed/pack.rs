@@ -5,7 +5,7 @@ use protocol::table::control::{ControlReader, ControlWriter};
 use protocol::table::geometry::{self, GeometrySpan};
 use protocol::table::rules;
 use protocol::table::span::{SpanReader, SpanWriter};
-use protocol::table::{AxisHeader, FORMAT_VERSION, Limits, Stream, TableError, TableHeader};
+use protocol::table::{AxisHeader, FORMAT_VERSION, Joint, Limits, Stream, TableError, TableHeader};
 use thiserror::Error;
 
 use super::override_bounds::warp;
@@ -122,27 +122,49 @@ pub enum PackError {
     },
 }
 
+/// Which piece of a table is packed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Cut {
+    /// The first q span, which begins a geometry span, and the number of the table that it takes over from; none: all from
+    /// the start.
+    pub(super) from: Option<(usize, u32)>,
+    /// The q span before which the next piece may take over.
+    pub(super) tail: Option<usize>,
+}
+
 /// Packs a table.
 ///
 /// # Errors
 /// What the format cannot express or a drive would refuse.
 pub fn pack(table: &FeedTable, number: u32, target: &Target) -> Result<Packed, PackError> {
+    pack_cut(table, number, target, Cut::default())
+}
+
+/// Packs a piece of a table.
+pub(super) fn pack_cut(
+    table: &FeedTable,
+    number: u32,
+    target: &Target,
+    cut: Cut,
+) -> Result<Packed, PackError> {
     let tick_ns = target.tick_ns;
     check_shape(table, target.axes.len())?;
     check_times(table, tick_ns)?;
+    let first = cut.from.map_or(0, |(span, _)| span);
+    let knot = knot_of(table, first)?;
     let mut shared = Vec::new();
-    write_geometry(table, &mut shared)?;
+    write_geometry(table, first, knot, &mut shared)?;
     let geometry_bytes = shared.len() as u32;
-    write_spans(table, &mut shared);
+    write_spans(table, first, &mut shared);
     let axes = table.path.axes.iter().zip(&target.axes).enumerate();
     let axes: Vec<PackedAxis> =
-        axes.map(|(i, (axis, scale))| pack_axis(i, number, axis, scale)).collect::<Result<_, _>>()?;
+        axes.map(|(i, (axis, scale))| pack_axis(i, number, axis, knot, scale)).collect::<Result<_, _>>()?;
     let limits: Vec<Limits> = axes.iter().map(|axis| axis.header.limits).collect();
     let header = TableHeader {
         version: FORMAT_VERSION,
         table: number,
-        spans: table.spans() as u32,
-        geometry_spans: table.path.spans() as u32,
+        spans: (table.spans() - first) as u32,
+        geometry_spans: (table.path.spans() - knot) as u32,
         step_exponent: step_exponent(table.path.step)?,
         q_scale: table.q_scale,
         tick_ns,
@@ -150,9 +172,32 @@ pub fn pack(table: &FeedTable, number: u32, target: &Target) -> Result<Packed, P
         span_bytes: shared.len() as u32 - geometry_bytes,
         margin: rules::USUAL_MARGIN,
         warp: warp(&target.override_rule, &limits, tick_ns),
+        joint: cut.from.map(|(span, number)| joint(table, span, knot, number)).transpose()?,
+        tail: cut.tail.map(|span| span.saturating_sub(first) as u32),
     };
     header.check().map_err(PackError::Rule)?;
     Ok(Packed { header, shared, axes })
+}
+
+/// The geometry knot at which a q span begins.
+fn knot_of(table: &FeedTable, span: usize) -> Result<usize, PackError> {
+    let at: u64 = table.steps.iter().take(span).map(|&step| u64::from(step)).sum();
+    table.path.breaks.binary_search(&at).map_err(|_| PackError::Shape("q spans and geometry knots"))
+}
+
+/// What comes before a piece that takes over.
+fn joint(table: &FeedTable, span: usize, knot: usize, number: u32) -> Result<Joint, PackError> {
+    let length = |index: usize| {
+        let pair = table.path.breaks.get(index..index + 2)?;
+        u32::try_from(pair[1] - pair[0]).ok()
+    };
+    let lengths = knot.checked_sub(2).and_then(|k| Some([length(k)?, length(k + 1)?]));
+    let before =
+        span.checked_sub(1).and_then(|s| Some((*table.steps.get(s)?, *table.codes.get(s.checked_sub(1)?)?)));
+    match (lengths, before) {
+        (Some(lengths), Some((step, code))) => Ok(Joint { table: number, step, code, lengths }),
+        _ => Err(PackError::Shape("joint and knots")),
+    }
 }
 
 fn check_shape(table: &FeedTable, scales: usize) -> Result<(), PackError> {
@@ -191,10 +236,10 @@ fn check_times(table: &FeedTable, tick_ns: u32) -> Result<(), PackError> {
 }
 
 /// Lengths of the geometry spans and how many q spans fill each.
-fn write_geometry(table: &FeedTable, out: &mut Vec<u8>) -> Result<(), PackError> {
+fn write_geometry(table: &FeedTable, first: usize, knot: usize, out: &mut Vec<u8>) -> Result<(), PackError> {
     let shape = || PackError::Shape("q spans and geometry knots");
-    let mut steps = table.steps.iter();
-    for (index, pair) in table.path.breaks.windows(2).enumerate() {
+    let mut steps = table.steps.iter().skip(first);
+    for (index, pair) in table.path.breaks.windows(2).skip(knot).enumerate() {
         let length = pair[1].checked_sub(pair[0]).filter(|length| *length > 0).ok_or_else(shape)?;
         let (mut filled, mut spans) = (0u64, 0);
         while filled < length {
@@ -213,11 +258,12 @@ fn write_geometry(table: &FeedTable, out: &mut Vec<u8>) -> Result<(), PackError>
     if steps.next().is_some() { Err(shape()) } else { Ok(()) }
 }
 
-fn write_spans(table: &FeedTable, out: &mut Vec<u8>) {
+fn write_spans(table: &FeedTable, first: usize, out: &mut Vec<u8>) {
     let mut writer = SpanWriter::default();
-    let mut knots = table.path.breaks.iter().skip(1).peekable();
-    let mut at = 0u64;
-    for (i, &step) in table.steps.iter().enumerate() {
+    let start: u64 = table.steps.iter().take(first).map(|&step| u64::from(step)).sum();
+    let mut knots = table.path.breaks.iter().skip_while(|knot| **knot <= start).peekable();
+    let mut at = start;
+    for (i, &step) in table.steps.iter().enumerate().skip(first) {
         at += u64::from(step);
         let closes = knots.next_if(|knot| **knot == at).is_some();
         let code = i.checked_sub(1).and_then(|inner| table.codes.get(inner)).copied();
@@ -236,17 +282,24 @@ fn step_exponent(step: f64) -> Result<i8, PackError> {
     }
 }
 
-fn pack_axis(index: usize, number: u32, axis: &GridAxis, scale: &AxisScale) -> Result<PackedAxis, PackError> {
+fn pack_axis(
+    index: usize,
+    number: u32,
+    axis: &GridAxis,
+    knot: usize,
+    scale: &AxisScale,
+) -> Result<PackedAxis, PackError> {
     let fraction_bits = fraction_bits(index, axis.lsb * scale.counts_per_unit)?;
     let rule = |error| PackError::AxisRule { axis: index, error };
     let furthest = rules::MAX_CONTROL_STEP << fraction_bits;
     let mut controls = Vec::new();
     let mut writer = ControlWriter::default();
-    for (i, &point) in axis.controls.iter().enumerate() {
+    let points = axis.controls.get(knot..).unwrap_or(&[]);
+    for (i, &point) in points.iter().enumerate() {
         if point.unsigned_abs() >= rules::MAX_CONTROL.unsigned_abs() {
             return Err(rule(TableError::Range { stream: Stream::Controls, index: i as u32 }));
         }
-        if i > 0 && (point - axis.controls[i - 1]).abs() >= furthest {
+        if i > 0 && (point - points[i - 1]).abs() >= furthest {
             return Err(rule(TableError::ControlStep { index: i as u32 }));
         }
         writer.push(&mut controls, point);
@@ -256,8 +309,8 @@ fn pack_axis(index: usize, number: u32, axis: &GridAxis, scale: &AxisScale) -> R
         table: number,
         axis: index as u8,
         fraction_bits,
-        start: end(axis.controls.first()),
-        end: end(axis.controls.last()),
+        start: end(points.first()),
+        end: end(points.last()),
         limits: limits_in_counts(&scale.limits, scale.counts_per_unit),
         control_bytes: controls.len() as u32,
     };
@@ -292,12 +345,15 @@ pub fn limits_in_counts(limits: &AxisLimits, counts_per_unit: f64) -> Limits {
 pub fn unpack(packed: &Packed, lsbs: &[f64]) -> Result<FeedTable, PackError> {
     let header = &packed.header;
     header.check().map_err(PackError::Rule)?;
+    if header.joint.is_some() {
+        return Err(PackError::Shape("pieces"));
+    }
     if packed.axes.len() != lsbs.len() {
         return Err(PackError::Shape("axes"));
     }
     let split = packed.shared.split_at_checked(header.geometry_bytes as usize);
     let (geometry, spans) = split.ok_or(PackError::Shape("stream lengths"))?;
-    let mut reader = SpanReader::new(header.spans);
+    let mut reader = SpanReader::new(header.spans, false);
     let (mut breaks, mut steps, mut codes) = (vec![], vec![], vec![]);
     let mut at = 0u64;
     while let Some(span) = reader.next(geometry, spans).map_err(PackError::Rule)? {

@@ -1,7 +1,7 @@
 use super::*;
 use crate::bus::{BLOCK_BYTES, FrameSize, Reassembler, Segments};
 use crate::schema;
-use crate::table::{AxisLimit, HeaderField, Limits, Stream, Warp};
+use crate::table::{AxisLimit, HeaderField, Joint, Limits, Stream, Warp};
 use proptest::prelude::*;
 
 extern crate std;
@@ -24,9 +24,13 @@ const HEADER: TableHeader = TableHeader {
     span_bytes: 10,
     margin: 5,
     warp: None,
+    joint: None,
+    tail: None,
 };
 
 const WARP: Warp = Warp { rate: 1, acceleration: 2, jerk: 3, slope: 4, bend: 5 };
+
+const JOINT: Joint = Joint { table: 6, step: 7, code: 8, lengths: [9, 10] };
 
 const AXIS: AxisHeader = AxisHeader {
     table: 300,
@@ -45,7 +49,7 @@ fn host_messages_are_pinned() {
     let cases: [(HostMessage<'_>, &[u8]); 15] = [
         (
             HostMessage::Open(HEADER),
-            &[0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10, 5, 0],
+            &[0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10, 5, 0, 0, 0],
         ),
         (
             HostMessage::OpenAxis(AXIS),
@@ -64,8 +68,11 @@ fn host_messages_are_pinned() {
         (HostMessage::Override { permille: 500, tick: 7 }, &[11, 0xf4, 3, 7]),
         (HostMessage::Alive, &[12]),
         (
-            HostMessage::Open(TableHeader { warp: Some(WARP), ..HEADER }),
-            &[0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10, 5, 1, 1, 2, 3, 4, 5],
+            HostMessage::Open(TableHeader { warp: Some(WARP), joint: Some(JOINT), tail: Some(11), ..HEADER }),
+            &[
+                0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10, 5, 1, 1, 2, 3, 4, 5, 1, 6,
+                7, 8, 9, 10, 1, 11,
+            ],
         ),
     ];
     for (message, golden) in cases {
@@ -94,7 +101,7 @@ fn drive_messages_are_pinned() {
     };
     let telemetry =
         Telemetry { ticks: 200, following_max: 3, following_rms: 1.0, fill_ms: 5, worst_tick: 90 };
-    let cases: [(DriveMessage, &[u8]); 31] = [
+    let cases: [(DriveMessage, &[u8]); 32] = [
         (DriveMessage::Telemetry(telemetry), &[4, 0xc8, 1, 3, 0, 0, 0x80, 0x3f, 5, 90]),
         (reject(Reject::Target), &[1, 1, 14]),
         (
@@ -126,6 +133,7 @@ fn drive_messages_are_pinned() {
         (reject(Reject::Power(Power::SwitchedOn)), &[1, 1, 15, 2]),
         (reject(Reject::Moves), &[1, 1, 16]),
         (reject(Reject::Override), &[1, 1, 17]),
+        (reject(Reject::Joint), &[1, 1, 18]),
         (status(State::Held, Some(Fault::Connection)), &[2, 6, 3, 1, 2, 1, 3, 3]),
         (status(State::Idle, Some(Fault::Board { code: 300 })), &[2, 0, 3, 1, 3, 0xac, 2, 1, 3, 3]),
         (status(State::Idle, None), &[2, 0, 3, 0, 1, 3, 3]),
@@ -144,7 +152,7 @@ fn drive_messages_are_pinned() {
 
 #[test]
 fn the_schema_is_pinned() {
-    assert_eq!(schema::HASH, 0xfc46_5952_e90f_bcb3, "{:#018x}", schema::HASH);
+    assert_eq!(schema::HASH, 0xfdb5_4ff2_527c_7542, "{:#018x}", schema::HASH);
 }
 
 #[test]
@@ -170,6 +178,8 @@ fn the_longest_headers_have_checksums() {
         span_bytes: most,
         margin: u8::MAX,
         warp: Some(Warp { rate: most, acceleration: most, jerk: most, slope: u64::MAX, bend: u64::MAX }),
+        joint: Some(Joint { table: most, step: most, code: most, lengths: [most; 2] }),
+        tail: Some(most),
     };
     let limits = Limits { velocity: 1.0, acceleration: 1.0, jerk: Some(1.0) };
     let (start, end) = (i64::MIN, i64::MIN);

@@ -43,6 +43,10 @@ pub enum HeaderField {
     Margin,
     /// Bounds of override and hold: out of range, or too much for the axis' limits.
     Warp,
+    /// Where it takes over from another table.
+    Joint,
+    /// Where another table may take over.
+    Tail,
 }
 
 /// Why bytes are not a table, or the table breaks a rule; `index` counts entries of the stream from 0.
@@ -167,6 +171,8 @@ impl fmt::Display for HeaderField {
             HeaderField::Limits => "axis limits",
             HeaderField::Margin => "margin",
             HeaderField::Warp => "override",
+            HeaderField::Joint => "joint",
+            HeaderField::Tail => "tail",
         })
     }
 }

@@ -33,6 +33,36 @@ pub struct TableHeader {
     pub margin: u8,
     /// How path time may be slowed, held and hurried; none: not at all.
     pub warp: Option<Warp>,
+    /// Where it takes over from a table in motion; none: it begins at rest.
+    pub joint: Option<Joint>,
+    /// The q span before which the next table may take over; it begins a geometry span. None: this table is played to its end.
+    pub tail: Option<u32>,
+}
+
+/// How a table goes on where another one is left.
+///
+/// From a q span of the other table on, this one is played instead. It begins with that very span: the length and the code
+/// of its first q span, the lengths of its first two geometry spans and its first three control points are those of the other
+/// table there. With what comes before them, stated here, they make position, velocity and acceleration the same to the bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Joint {
+    /// The other table.
+    pub table: u32,
+    /// The q span before: its length [grid steps] and its code.
+    pub step: u32,
+    /// Its code.
+    pub code: u32,
+    /// Lengths of the two geometry spans before [grid steps].
+    pub lengths: [u32; 2],
+}
+
+impl Joint {
+    /// Every field is in its range.
+    pub fn is_valid(&self) -> bool {
+        let fits = |length: u32| (1..rules::MAX_GEOMETRY_LENGTH).contains(&length);
+        let [a, b] = self.lengths;
+        fits(self.step) && fits(a) && fits(b) && (1..=rules::MAX_CODE).contains(&self.code)
+    }
 }
 
 /// Header of one axis' part.
@@ -44,7 +74,7 @@ pub struct AxisHeader {
     pub axis: u8,
     /// Control points are in units of 2^-f counts.
     pub fraction_bits: u8,
-    /// Position at the start [counts].
+    /// Position at the start, or the first control point of a table that joins another one [counts].
     pub start: i64,
     /// Position at the end [counts].
     pub end: i64,
@@ -92,6 +122,14 @@ impl TableHeader {
         }
         if self.warp.is_some_and(|warp| !warp.is_valid()) {
             return refuse(HeaderField::Warp);
+        }
+        if self.joint.is_some_and(|joint| !joint.is_valid() || joint.table == self.table) {
+            return refuse(HeaderField::Joint);
+        }
+        // The code of the span before, and that of the one behind, are values of q's own, not those of a rest.
+        let first = if self.joint.is_some() { 1 } else { 3 };
+        if self.tail.is_some_and(|tail| tail < first || u64::from(tail) + 3 > u64::from(self.spans)) {
+            return refuse(HeaderField::Tail);
         }
         Ok(())
     }

@@ -2,7 +2,8 @@
 //!
 //! Per q span its step [grid steps] as a varint, unless it is the last one of its geometry span (then the rest
 //! of that span's length is its step), followed by its code as a zigzag second difference, unless it is the
-//! first or last span of the table (those are rest spans and carry no code).
+//! first or last span of the table (those are rest spans and carry no code). The first span of a table that joins another one
+//! is no rest span, and has a code.
 
 use super::geometry::GeometryReader;
 use super::rules::MAX_CODE;
@@ -49,11 +50,13 @@ pub struct SpanReader {
     codes: SecondDifference,
     index: u32,
     spans: u32,
+    /// The first span has a code: it is no rest span.
+    joined: bool,
 }
 
 impl SpanReader {
-    /// The start of a table with `spans` q spans.
-    pub fn new(spans: u32) -> Self {
+    /// The start of a table with `spans` q spans; `joined` if it goes on where another one is left.
+    pub fn new(spans: u32, joined: bool) -> Self {
         Self {
             geometry: GeometryReader::default(),
             length_left: 0,
@@ -62,6 +65,7 @@ impl SpanReader {
             codes: SecondDifference::default(),
             index: 0,
             spans,
+            joined,
         }
     }
 
@@ -87,7 +91,7 @@ impl SpanReader {
                 _ => return Err(TableError::Overfull { index }),
             }
         };
-        let code = if index == 0 || index.saturating_add(1) == self.spans {
+        let code = if (index == 0 && !self.joined) || index.saturating_add(1) == self.spans {
             0
         } else {
             let word = varint::read(bytes, &mut self.at).map_err(fail)?;

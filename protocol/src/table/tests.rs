@@ -34,7 +34,7 @@ fn streams_are_pinned() {
 #[test]
 fn spans_come_back_with_their_geometry() {
     let (geometry, bytes) = small();
-    let mut reader = SpanReader::new(5);
+    let mut reader = SpanReader::new(5, false);
     let mut spans = Vec::new();
     while let Some(span) = reader.next(&geometry, &bytes).unwrap() {
         spans.push(span);
@@ -53,7 +53,7 @@ fn spans_come_back_with_their_geometry() {
 }
 
 fn read(spans: u32, geometry: &[u8], bytes: &[u8]) -> Result<(), TableError> {
-    let mut reader = SpanReader::new(spans);
+    let mut reader = SpanReader::new(spans, false);
     while reader.next(geometry, bytes)?.is_some() {}
     reader.finish(geometry, bytes)
 }
@@ -94,6 +94,7 @@ fn control_points_are_bounded() {
 #[test]
 fn header_fields_are_checked_by_name() {
     let still = Warp { rate: 1 << 24, acceleration: 1 << 24, jerk: 1 << 24, slope: 1, bend: 1 };
+    let joint = |table, code| Joint { table, step: 5, code, lengths: [9, 9] };
     let good = TableHeader {
         version: FORMAT_VERSION,
         table: 1,
@@ -106,6 +107,8 @@ fn header_fields_are_checked_by_name() {
         span_bytes: 1,
         margin: 5,
         warp: None,
+        joint: None,
+        tail: None,
     };
     assert_eq!(good.check(), Ok(()));
     assert_eq!(good.step(), 1.0 / 1024.0);
@@ -121,6 +124,10 @@ fn header_fields_are_checked_by_name() {
         (TableHeader { tick_ns: 0, ..good }, HeaderField::Tick),
         (TableHeader { margin: 16, ..good }, HeaderField::Margin),
         (TableHeader { warp: Some(still), ..good }, HeaderField::Warp),
+        (TableHeader { joint: Some(joint(1, 0)), ..good }, HeaderField::Joint),
+        (TableHeader { joint: Some(joint(good.table, 7)), ..good }, HeaderField::Joint),
+        (TableHeader { tail: Some(2), ..good }, HeaderField::Tail),
+        (TableHeader { tail: Some(3), ..good }, HeaderField::Tail),
     ];
     for (header, field) in cases {
         assert_eq!(header.check(), Err(TableError::Header(field)));
@@ -139,7 +146,7 @@ proptest! {
         bytes in prop::collection::vec(any::<u8>(), 0..80),
         spans in any::<u32>(),
     ) {
-        let mut reader = SpanReader::new(spans);
+        let mut reader = SpanReader::new(spans, false);
         let mut read = 0;
         while let Ok(Some(span)) = reader.next(&geometry, &bytes) {
             prop_assert!(span.step > 0);
