@@ -4,7 +4,8 @@
 //! root only, so the same source gives the same bits on every machine.
 //!
 //! [`table`] is the one door: bytes become a [`table::CheckedTable`] or a named error. [`evaluate`] plays a
-//! checked table at any path time. [`double_s`] plans motion where there is no table.
+//! checked table at any path time. [`double_s`] plans motion where there is no table, and
+//! [`filter`] follows references that nobody knows ahead.
 //!
 //! A drive has two halves. [`intake`] talks: messages in, tables checked, answers out. [`motion`] moves: one set-point per
 //! control tick. They share no memory and hand each other [`orders`], so that the tick never waits. [`player`] is both on the
@@ -16,6 +17,7 @@ mod course;
 pub mod double_s;
 pub mod drive;
 pub mod evaluate;
+pub mod filter;
 mod guard;
 pub mod halves;
 pub mod intake;

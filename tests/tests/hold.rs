@@ -31,28 +31,35 @@ fn table(packed: &Packed, axis: usize) -> CheckedTable<'_> {
     TableView::new(&packed.header, &part.header, &packed.shared, &part.controls).unwrap().check().unwrap()
 }
 
-/// Steps in which the path is searched, again and again.
-const STEPS: u64 = 2_000;
+/// Steps in which a stretch of the path is searched, and how many of the best places are looked at closer.
+const STEPS: u64 = 500;
+const PLACES: usize = 12;
 
 /// How far off the path the axes are together: the least that the farthest of them has to its place there [counts].
 fn off_the_path(packed: &Packed, positions: &[i64]) -> i64 {
     let tables: Vec<_> = (0..positions.len()).map(|axis| table(packed, axis)).collect();
-    let (mut from, mut to) = (0, tables[0].duration());
+    let mut stretches = vec![(0, tables[0].duration())];
     loop {
-        let mut cursors: Vec<_> = tables.iter().map(|table| Cursor::new(table).unwrap()).collect();
-        let step = ((to - from) / STEPS).max(1);
-        let mut best = (i64::MAX, from);
-        for time in (from..=to).step_by(step as usize) {
-            let away = |((cursor, table), at): ((&mut Cursor, _), &i64)| {
-                (cursor.evaluate(table, time).unwrap().position - at).abs()
-            };
-            let off = cursors.iter_mut().zip(&tables).zip(positions).map(away).max().unwrap();
-            best = best.min((off, time));
+        let mut places = Vec::new();
+        let mut last = true;
+        for (from, to) in stretches {
+            let mut cursors: Vec<_> = tables.iter().map(|table| Cursor::new(table).unwrap()).collect();
+            let step = ((to - from) / STEPS).max(1);
+            last &= step == 1;
+            for time in (from..=to).step_by(step as usize) {
+                let away = |((cursor, table), at): ((&mut Cursor, _), &i64)| {
+                    (cursor.evaluate(table, time).unwrap().position - at).abs()
+                };
+                let off = cursors.iter_mut().zip(&tables).zip(positions).map(away).max().unwrap();
+                places.push((off, time, step));
+            }
         }
-        if best.0 <= 1 || step == 1 {
-            return best.0;
+        places.sort_unstable();
+        if places[0].0 <= 1 || last {
+            return places[0].0;
         }
-        (from, to) = (best.1.saturating_sub(step), best.1 + step);
+        stretches =
+            places.iter().take(PLACES).map(|&(_, t, step)| (t.saturating_sub(step), t + step)).collect();
     }
 }
 

@@ -78,7 +78,7 @@ impl<R: Real> Bounds<R> {
         Self { min: -self.max, max: -self.min }
     }
 
-    pub(super) fn hold(&self, x: R) -> bool {
+    pub(crate) fn hold(&self, x: R) -> bool {
         self.min <= x && x <= self.max
     }
 }
@@ -102,7 +102,7 @@ impl<R: Real> MotionLimits<R> {
         }
     }
 
-    pub(super) fn check(&self) -> Result<(), DoubleSError> {
+    pub(crate) fn check(&self) -> Result<(), DoubleSError> {
         if !self.velocity.is_valid() {
             return Err(DoubleSError::Limit(Quantity::Velocity));
         }
@@ -118,7 +118,7 @@ impl<R: Real> MotionLimits<R> {
 
 impl<R: Real> State<R> {
     /// The first of its numbers that is none.
-    pub(super) fn fault(&self) -> Option<Quantity> {
+    pub(crate) fn fault(&self) -> Option<Quantity> {
         if !self.position.is_finite() {
             Some(Quantity::Position)
         } else if !self.velocity.is_finite() {

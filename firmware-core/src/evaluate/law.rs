@@ -158,7 +158,7 @@ impl LawCursor {
     }
 
     /// Goes to the next span; `after` is the second one behind it.
-    #[inline]
+    #[inline(never)]
     fn enter(&mut self, view: &TableView<'_>, after: Span) -> Result<(), TableError> {
         // The span before the first one of a table that joins has number -1.
         let index = self.index.wrapping_add(1);
