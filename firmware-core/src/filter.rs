@@ -98,7 +98,7 @@ impl<R: Real> Filter<R> {
     fn land(&mut self, reference: &State<R>, limits: &MotionLimits<R>, even: bool) -> Option<State<R>> {
         if self.landing.is_none() && even {
             // As it was at the tick before.
-            let from = self.from_reference(reference);
+            let from = self.seen_from(reference);
             self.landing = self.plan(&from, reference, limits);
         }
         let landing = self.landing.as_mut()?;
@@ -116,7 +116,7 @@ impl<R: Real> Filter<R> {
     }
 
     /// The present state as seen from an even reference, which has gone on by a tick.
-    fn from_reference(&self, reference: &State<R>) -> State<R> {
+    fn seen_from(&self, reference: &State<R>) -> State<R> {
         let there = reference.position - reference.velocity * self.tick_s;
         State {
             position: self.state.position - there,

@@ -5,6 +5,7 @@ use firmware_core::evaluate::{Cursor, Setpoint};
 use firmware_core::table::{CheckedTable, TableView};
 use planner::feed::pack::Packed;
 use protocol::checksum::Fnv64;
+use tests::drives::asked;
 use tests::tables::{COARSE, FINE, Kind, Random, Sample};
 
 /// Path time units per second.
@@ -20,6 +21,7 @@ fn checked(packed: &Packed, axis: usize) -> CheckedTable<'_> {
 /// span relative to itself, beyond the half unit of its rounding.
 #[derive(Debug, Default)]
 struct Worst {
+    spans: u64,
     position: f64,
     velocity: f64,
     acceleration: f64,
@@ -28,12 +30,19 @@ struct Worst {
 
 fn compare(sample: &Sample, random: &mut Random, worst: &mut Worst) {
     let packed = sample.packed(1).unwrap();
+    worst.spans += u64::from(packed.header.spans);
     for axis in 0..sample.scales.len() {
         let table = checked(&packed, axis);
         let mut times: Vec<u64> = (0..100).map(|_| random.whole(0, table.duration() - 1)).collect();
         times.sort_unstable();
         let mut cursor = Cursor::new(&table).unwrap();
+        // What they are compared with: the largest at the knots, and where they are looked at.
         let (mut fastest, mut hardest) = (0f64, 0f64);
+        for span in 0..sample.table.spans() {
+            let at_knot = sample.motion(axis, span, 0.0);
+            fastest = fastest.max(at_knot.velocity.abs());
+            hardest = hardest.max(at_knot.acceleration.abs());
+        }
         let mut errors = Vec::new();
         for time in times {
             let found = cursor.evaluate(&table, time).unwrap();
@@ -61,7 +70,7 @@ fn compare(sample: &Sample, random: &mut Random, worst: &mut Worst) {
     }
 }
 
-fn worst(kind: Kind, seed: u64, tables: usize) -> Worst {
+fn worst(kind: Kind, seed: u64, tables: u64) -> Worst {
     let mut random = Random::new(seed);
     let mut worst = Worst::default();
     for _ in 0..tables {
@@ -70,10 +79,12 @@ fn worst(kind: Kind, seed: u64, tables: usize) -> Worst {
     worst
 }
 
+/// `FEEDSPLINE_CASES` asks for so many tables of either kind.
+
 #[test]
 fn setpoints_are_within_one_count_of_the_law() {
     for (kind, seed) in [(FINE, 1), (COARSE, 2)] {
-        let worst = worst(kind, seed, 400);
+        let worst = worst(kind, seed, asked("FEEDSPLINE_CASES", 400));
         println!("{worst:?}");
         assert!(worst.position <= 1.0, "{worst:?}");
         assert!(worst.velocity <= 1e-6, "{worst:?}");
