@@ -128,11 +128,21 @@ impl Rate {
             self.steps = self.steps.wrapping_add(sign);
             return;
         }
-        let most = if sign < 0 { warp.descent(self.s) } else { warp.climb() } as i64;
+        let climb = warp.climb() as i64;
+        let descent = warp.descent(self.s) as i64;
+        // Speeding up, what is admitted shrinks as the rate grows: no more than can be followed by less than a bend per tick.
+        let steepest = warp.followed() as i64;
+        let admitted = |ahead: i64| {
+            if sign < 0 {
+                return ahead <= descent;
+            }
+            let then = self.s.saturating_add_signed(ahead);
+            ahead <= climb || (ahead <= steepest && ahead <= warp.descent(then) as i64)
+        };
         let fits = |steps: i64| {
             let ahead = steps.wrapping_mul(bend);
             // Then steps of one bend less each, down to none: in all it is (steps + 1)/2 times as far.
-            ahead <= most && ahead.wrapping_mul(steps.wrapping_add(1)) <= far.wrapping_mul(2)
+            ahead.wrapping_mul(steps.wrapping_add(1)) <= far.wrapping_mul(2) && admitted(ahead)
         };
         let faster = steps.wrapping_add(1);
         let slower = steps.wrapping_sub(1).max(0);
@@ -171,8 +181,7 @@ mod tests {
             rate.advance(warp);
             let after = rate.step();
             assert!((after - before).unsigned_abs() <= warp.bend, "{rate:?}");
-            let most = if after < 0 { warp.descent(s) } else { warp.climb() };
-            assert!(after.unsigned_abs() <= most, "{rate:?}");
+            assert!(after.unsigned_abs() <= warp.descent(s.max(rate.s)), "{rate:?}");
             assert!(rate.s <= u64::from(warp.rate) << 24, "{rate:?}");
             assert_eq!(rate.s as i64, s as i64 + after);
         }
@@ -210,8 +219,7 @@ mod tests {
                 let (before, s) = (rate.step(), rate.s);
                 rate.advance(&warp);
                 assert!((rate.step() - before).unsigned_abs() <= warp.bend);
-                let most = if rate.step() < 0 { warp.descent(s) } else { warp.climb() };
-                assert!(rate.step().unsigned_abs() <= most, "{rate:?}");
+                assert!(rate.step().unsigned_abs() <= warp.descent(s.max(rate.s)), "{rate:?}");
                 assert!(rate.s <= of_permille(1200), "{rate:?}");
             }
         }

@@ -33,7 +33,7 @@ fn table(packed: &Packed, axis: usize) -> CheckedTable<'_> {
 
 /// Steps in which a stretch of the path is searched, and how many of the best places are looked at closer.
 const STEPS: u64 = 500;
-const PLACES: usize = 12;
+const PLACES: usize = 20;
 
 /// How far off the path the axes are together: the least that the farthest of them has to its place there [counts].
 fn off_the_path(packed: &Packed, positions: &[i64]) -> i64 {
@@ -46,20 +46,30 @@ fn off_the_path(packed: &Packed, positions: &[i64]) -> i64 {
             let mut cursors: Vec<_> = tables.iter().map(|table| Cursor::new(table).unwrap()).collect();
             let step = ((to - from) / STEPS).max(1);
             last &= step == 1;
-            for time in (from..=to).step_by(step as usize) {
-                let away = |((cursor, table), at): ((&mut Cursor, _), &i64)| {
-                    (cursor.evaluate(table, time).unwrap().position - at).abs()
-                };
-                let off = cursors.iter_mut().zip(&tables).zip(positions).map(away).max().unwrap();
-                places.push((off, time, step));
+            let times: Vec<u64> = (from..=to).step_by(step as usize).collect();
+            let offs: Vec<i64> = times
+                .iter()
+                .map(|&time| {
+                    let away = |((cursor, table), at): ((&mut Cursor, _), &i64)| {
+                        (cursor.evaluate(table, time).unwrap().position - at).abs()
+                    };
+                    cursors.iter_mut().zip(&tables).zip(positions).map(away).max().unwrap()
+                })
+                .collect();
+            // Places that are nearer than what is before and behind them: the path may come near itself.
+            for n in 0..offs.len() {
+                let before = n.checked_sub(1).is_none_or(|k| offs[k] > offs[n]);
+                let behind = offs.get(n + 1).is_none_or(|&off| off >= offs[n]);
+                if before && behind {
+                    places.push((offs[n], times[n].saturating_sub(2 * step), times[n] + 2 * step));
+                }
             }
         }
         places.sort_unstable();
         if places[0].0 <= 1 || last {
             return places[0].0;
         }
-        stretches =
-            places.iter().take(PLACES).map(|&(_, t, step)| (t.saturating_sub(step), t + step)).collect();
+        stretches = places.iter().take(PLACES).map(|&(_, from, to)| (from, to)).collect();
     }
 }
 

@@ -33,8 +33,9 @@ const PATIENCE_S: &str = "300";
 const SAME: [&str; 7] =
     ["setpoints", "setpoint_hash", "driven", "driven_hash", "plans", "imprecise", "plan_hash"];
 
-/// Most instructions that the image may report: what was measured, and a twentieth more. docs/benchmarks.md has targets.
-const MOST: [(&str, u64); 16] = [
+/// Most instructions, and bytes of stack, that the image may report: what was measured, and a twentieth more. docs/benchmarks.md has targets.
+const MOST: [(&str, u64); 17] = [
+    ("stack", 2_000),
     ("evaluate_most", 156),
     ("evaluate_mean", 153),
     ("span_most", 1_440),
@@ -43,8 +44,8 @@ const MOST: [(&str, u64); 16] = [
     ("tick_mean", 370),
     ("tick_end_most", 5_400),
     ("tick_end_mean", 3_450),
-    ("tick_override_most", 2_050),
-    ("tick_override_mean", 580),
+    ("tick_override_most", 2_310),
+    ("tick_override_mean", 658),
     ("tick_fallback_most", 900),
     ("tick_fallback_mean", 305),
     ("prove_per_span_most", 1_285),

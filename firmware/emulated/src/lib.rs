@@ -1,6 +1,7 @@
 //! What both images need of the board.
 #![no_std]
 
+pub mod stack;
 pub mod uart;
 pub mod workload;
 

@@ -56,6 +56,14 @@ impl Warp {
         room.saturating_mul(self.slope) >> 16
     }
 
+    /// Largest s' at which what is admitted shrinks by less than a bend per tick while the rate grows: bend/(2 rho rate), and a
+    /// little less [2^-48 per tick].
+    pub fn followed(&self) -> u64 {
+        let per_tick = self.slope as f32 / (1u64 << 40) as f32;
+        let rate = self.rate as f32 / ONE as f32;
+        (self.bend as f32 / (2.0625 * per_tick * rate)) as u64
+    }
+
     /// Largest |s'| at every rate [2^-48 per tick].
     pub fn climb(&self) -> u64 {
         self.descent(u64::from(self.rate) << 24)

@@ -8,7 +8,9 @@ use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::{debug, hprintln};
+use emulated::stack::Painted;
 use emulated::workload::{Work, drive, evaluate, plan_moves};
+use firmware_core::player::Player;
 
 /// Tables of real jobs.
 static TABLES: &[u8] = include_bytes!(env!("FEEDSPLINE_TABLES"));
@@ -92,14 +94,23 @@ fn main() -> ! {
             cost.note(counts);
         }
     };
+    // SAFETY: this is the main stack, in the last of four megabytes; the timer's interrupt is off.
+    let paint = || unsafe { Painted::below() };
+    let painted = paint();
     let evaluated = evaluate(TABLES, &mut note);
+    let evaluating = painted.used();
+    let painted = paint();
     let driven = drive(TABLES, [A, B], &mut note);
+    // There the whole drive lies on the stack; on a board it does not.
+    let driving = painted.used().saturating_sub(size_of::<Player<'_>>());
+    let painted = paint();
     let (Some(evaluated), Some(driven)) = (evaluated, driven) else {
         hprintln!("a table is refused");
         debug::exit(debug::EXIT_FAILURE);
         loop {}
     };
     let planned = plan_moves(MOVES, &mut note);
+    let stack = evaluating.max(driving).max(painted.used());
     hprintln!("setpoints {}", evaluated.setpoints);
     hprintln!("setpoint_hash {}", evaluated.hash);
     hprintln!("driven {}", driven.setpoints);
@@ -111,6 +122,7 @@ fn main() -> ! {
         hprintln!("{}_most {}", name, cost.most());
         hprintln!("{}_mean {}", name, cost.mean());
     }
+    hprintln!("stack {}", stack);
     debug::exit(debug::EXIT_SUCCESS);
     loop {}
 }
