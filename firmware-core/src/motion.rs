@@ -6,23 +6,23 @@
 //! axis' limits leaves the path: the axis comes to rest by a double-S from the set-point before, within its limits. Faults
 //! stay latched with their first cause. At rest the axis may be sent to a position or a velocity.
 
+mod obey;
+mod play;
+
 use heapless::Vec;
-use protocol::message::{Fault, Reject, State, Status};
+use protocol::message::{Fault, State, Status};
 use protocol::power::{Power, PowerEvent};
-use protocol::table::warp::RATE_ONE;
 
 use crate::axis::{AxisConfig, FaultOption, LostOption, QuickStopOption};
 use crate::course::Course;
-use crate::evaluate::{Cursor, Setpoint};
+use crate::evaluate::Setpoint;
 use crate::guard::Guard;
 use crate::orders::{Order, Report};
-use crate::rate::{Pace, Rate, of_permille};
+use crate::rate::Rate;
 use crate::store::Loaded;
 use crate::telemetry::Window;
-use crate::time::{PathClock, tick_time, ticks_until};
-
-/// Largest commanded rate [0.1 %].
-const MOST_PERMILLE: u16 = 2000;
+use crate::time::{tick_time, ticks_until};
+use play::Playing;
 
 /// Where orders come from and reports go; neither ever waits.
 pub trait Link<'a> {
@@ -37,31 +37,6 @@ pub trait Link<'a> {
 
     /// Hands a report over; without room it is lost.
     fn report(&mut self, report: Report<'a>);
-}
-
-/// A table that plays.
-#[derive(Debug)]
-struct Playing<'a> {
-    table: Loaded<'a>,
-    cursor: Cursor,
-    clock: PathClock,
-    /// Where the table's own time begins on that clock [2^-32 s]: later than 0 if it has taken over from another one.
-    began: u64,
-    /// Tick at which it will have come to rest, if the rate is 1 from now on.
-    end: u64,
-}
-
-impl Playing<'_> {
-    /// Path time at which it will have come to rest.
-    fn until(&self) -> u64 {
-        self.began.saturating_add(self.table.duration())
-    }
-
-    /// Tick at which motion ends that goes on until another path time.
-    fn end_after(&self, until: u64, tick_ns: u32) -> u64 {
-        let [now, then] = [self.until(), until].map(|time| ticks_until(time, tick_ns));
-        self.end.saturating_add(then).saturating_sub(now)
-    }
 }
 
 /// A table that will start.
@@ -256,161 +231,6 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// The number of the table that an order is about, what came of it, and whether it took planning.
-    fn obey(&mut self, order: Order<'a>) -> (u32, Result<(), Reject>, bool) {
-        match order {
-            Order::Start { table, tick } => {
-                let (number, joins) = (table.number(), table.header().joint.is_some());
-                let allowed = if joins { self.may_inherit(&table) } else { self.may_start(&table, tick) };
-                match allowed {
-                    Ok(()) if joins => self.heir = Some(table),
-                    Ok(()) => self.armed = Some(Armed { table, tick }),
-                    Err(_) => self.give_back(table, true),
-                }
-                (number, allowed, false)
-            }
-            Order::StartAgain { table, tick } => {
-                let plays = self.playing.as_ref().is_some_and(|p| p.table.number() == table);
-                let waits = self.armed.as_ref().is_some_and(|a| a.table.number() == table && a.tick == tick)
-                    || self.heir.as_ref().is_some_and(|heir| heir.number() == table);
-                let reason = if self.armed.is_some() { Reject::Busy } else { Reject::NotReady };
-                (table, if plays || waits { Ok(()) } else { Err(reason) }, false)
-            }
-            Order::Stop => {
-                self.disarm();
-                (0, Ok(()), false)
-            }
-            Order::MoveTo { position, velocity } => (0, self.move_to(position, velocity), true),
-            Order::MoveAt { velocity } => (0, self.move_at(velocity), true),
-            Order::Power(event) => (0, self.change_power(event), event == PowerEvent::QuickStop),
-            Order::Override { permille, tick } => (0, self.change_rate(permille, tick), false),
-            Order::Alive => (0, Ok(()), false),
-        }
-    }
-
-    /// Whether a table may be armed for a tick.
-    #[inline(never)]
-    fn may_start(&self, table: &Loaded<'_>, tick: u64) -> Result<(), Reject> {
-        self.refuse_without_torque()?;
-        if self.excursion.is_some() || self.armed.is_some() || self.heir.is_some() {
-            return Err(Reject::Busy);
-        }
-        if tick < self.tick {
-            return Err(Reject::Late { tick: self.tick });
-        }
-        if let Some(playing) = self.playing.as_ref().filter(|playing| tick < playing.end) {
-            return Err(Reject::Overlap { tick: playing.end });
-        }
-        let ends = self.playing.as_ref().map(|p| p.table.axis().end);
-        let position = ends.unwrap_or(self.last.position);
-        if table.axis().start != position {
-            return Err(Reject::Position { position });
-        }
-        if table.header().warp.is_none() && !self.rate.is_plain() {
-            return Err(Reject::Override);
-        }
-        Ok(())
-    }
-
-    /// Whether a table may take over from the one that it names: that one plays or is armed, and its tail has not begun.
-    #[inline(never)]
-    fn may_inherit(&self, table: &Loaded<'_>) -> Result<(), Reject> {
-        self.refuse_without_torque()?;
-        if self.heir.is_some() || (self.playing.is_some() && self.armed.is_some()) {
-            return Err(Reject::Busy);
-        }
-        let named = table.header().joint.map(|joint| joint.table);
-        let armed = self.armed.as_ref().is_some_and(|armed| Some(armed.table.number()) == named);
-        let playing = self.playing.as_ref().filter(|playing| Some(playing.table.number()) == named);
-        match playing.and_then(|p| Some((p, p.table.header().tail?))) {
-            Some((p, tail)) if p.cursor.span() < tail => Ok(()),
-            Some(_) => Err(Reject::Late { tick: self.tick }),
-            None if armed => Ok(()),
-            None => Err(Reject::NotReady),
-        }
-    }
-
-    /// Sets out for a position, from rest or from the way to another one.
-    #[inline(never)]
-    fn move_to(&mut self, position: i64, velocity: Option<f32>) -> Result<(), Reject> {
-        self.refuse_to_stray()?;
-        let AxisConfig { mut limits, tick_ns, travel, .. } = self.config;
-        let slower = velocity.unwrap_or(limits.velocity);
-        let sensible = slower > 0.0 && travel.is_none_or(|[low, high]| (low..=high).contains(&position));
-        if !sensible {
-            return Err(Reject::Target);
-        }
-        limits.velocity = slower.min(limits.velocity);
-        let course = Course::to(&self.last, position, &limits, tick_ns).map_err(|_| Reject::Target)?;
-        self.excursion = Some(Excursion { course, stops: false });
-        Ok(())
-    }
-
-    /// Goes at a velocity; towards the end of the travel, where there is one.
-    #[inline(never)]
-    fn move_at(&mut self, velocity: f32) -> Result<(), Reject> {
-        let AxisConfig { limits, tick_ns, travel, .. } = self.config;
-        let admissible = velocity.abs() <= limits.velocity;
-        if !admissible {
-            return Err(Reject::Target);
-        }
-        if velocity != 0.0
-            && let Some([low, high]) = travel
-        {
-            return self.move_to(if velocity > 0.0 { high } else { low }, Some(velocity.abs()));
-        }
-        self.refuse_to_stray()?;
-        let course =
-            Course::to_velocity(&self.last, velocity, &limits, tick_ns).map_err(|_| Reject::Target)?;
-        self.excursion = Some(Excursion { course, stops: false });
-        Ok(())
-    }
-
-    /// A command that changes the power state.
-    #[inline(never)]
-    fn change_power(&mut self, event: PowerEvent) -> Result<(), Reject> {
-        let to = self.power.after(event).ok_or(Reject::Power(self.power))?;
-        let enabled = self.power == Power::OperationEnabled;
-        match event {
-            // Nobody but the drive itself knows of these.
-            PowerEvent::Fault | PowerEvent::Stopped => return Err(Reject::Power(self.power)),
-            PowerEvent::Shutdown | PowerEvent::DisableOperation if enabled && self.moves() => {
-                return Err(Reject::Moves);
-            }
-            PowerEvent::EnableOperation if !enabled && self.moves() => return Err(Reject::Moves),
-            PowerEvent::ResetFault => self.fault = None,
-            _ => {}
-        }
-        self.power = to;
-        let stops = self.config.options.quick_stop != QuickStopOption::Disable;
-        match to {
-            Power::QuickStopActive if stops => self.land(),
-            Power::QuickStopActive => {
-                self.freeze();
-                self.power = Power::SwitchOnDisabled;
-            }
-            Power::OperationEnabled => {}
-            _ => self.freeze(),
-        }
-        Ok(())
-    }
-
-    /// A command that changes the rate of path time.
-    fn change_rate(&mut self, permille: u16, tick: u64) -> Result<(), Reject> {
-        if tick < self.tick {
-            return Err(Reject::Late { tick: self.tick });
-        }
-        let target = of_permille(permille);
-        let admitted = self.playing.as_ref().is_none_or(|playing| {
-            playing.table.header().warp.is_some_and(|warp| target <= u64::from(warp.rate) << 24)
-        });
-        if permille > MOST_PERMILLE || !admitted {
-            return Err(Reject::Override);
-        }
-        self.change = Some(Change { target, tick });
-        Ok(())
-    }
-
     /// Counts how long the host has been silent.
     fn listen(&mut self) {
         self.silence = self.silence.saturating_add(1);
@@ -462,120 +282,6 @@ impl<'a> Motion<'a> {
     fn fail_now(&mut self, fault: Fault) -> Setpoint {
         self.fail(fault);
         self.stray()
-    }
-
-    /// When the table before it is at its end, the armed table becomes the one that plays.
-    #[inline(never)]
-    fn begin(&mut self) -> Result<(), Fault> {
-        let free = self.playing.as_ref().is_none_or(|p| p.clock.time() >= p.until());
-        if !free {
-            return Ok(());
-        }
-        if let Some(before) = self.playing.take() {
-            self.give_back(before.table, false);
-        }
-        let Some(Armed { table, .. }) = self.armed.take() else { return Ok(()) };
-        let ticks = ticks_until(table.duration(), self.config.tick_ns);
-        let cursor = match table.table().map(|view| Cursor::new(&view)) {
-            Some(Ok(cursor)) => cursor,
-            Some(Err(error)) => {
-                let fault = Fault::Table { table: table.number(), error };
-                self.give_back(table, false);
-                return Err(fault);
-            }
-            None => return Ok(()),
-        };
-        // At rest the rate may be what it will.
-        let most = table.header().warp.map_or(RATE_ONE, |warp| u64::from(warp.rate) << 24);
-        self.rate.aim(self.rate.target().min(most));
-        self.rate.jump();
-        self.lag = 0;
-        let clock = PathClock::new(self.config.tick_ns);
-        let end = self.tick.saturating_add(ticks);
-        self.playing = Some(Playing { table, cursor, clock, began: 0, end });
-        Ok(())
-    }
-
-    /// Lets the heir take over when its time has come.
-    #[inline(never)]
-    fn inherit(&mut self) -> Result<(), Fault> {
-        let (Some(playing), Some(heir)) = (&mut self.playing, &self.heir) else { return Ok(()) };
-        let (Some(here), Some(next)) = (playing.table.table(), heir.table()) else { return Ok(()) };
-        let Some(tail) = here.header().tail else { return Ok(()) };
-        let fault = |error| Fault::Table { table: here.header().table, error };
-        if !playing.cursor.approach(&here, playing.clock.time(), tail).map_err(fault)? {
-            return Ok(());
-        }
-        let joined = playing.cursor.joined(&next);
-        let cursor = joined.map_err(|error| Fault::Table { table: next.header().table, error })?;
-        let until = cursor.began().saturating_add(next.duration());
-        playing.end = playing.end_after(until, self.config.tick_ns);
-        (playing.cursor, playing.began) = (cursor, cursor.began());
-        if let Some(heir) = self.heir.take() {
-            let before = core::mem::replace(&mut playing.table, heir);
-            self.give_back(before, false);
-        }
-        Ok(())
-    }
-
-    fn play(&mut self) -> Result<Setpoint, Fault> {
-        if self.heir.is_some() {
-            self.inherit()?;
-        }
-        let Some(playing) = &mut self.playing else {
-            self.rate.jump();
-            return Ok(Setpoint::at_rest(self.last.position));
-        };
-        let Some(table) = playing.table.table() else { return Ok(Setpoint::at_rest(self.last.position)) };
-        let setpoint = playing
-            .cursor
-            .evaluate(&table, playing.clock.time())
-            .map_err(|error| Fault::Table { table: table.header().table, error })?;
-        if !setpoint.done && self.rate.is_plain() {
-            playing.clock.advance();
-            return Ok(setpoint);
-        }
-        Ok(self.play_unusually(setpoint))
-    }
-
-    /// The end of a table, and rates other than 1.
-    #[inline(never)]
-    fn play_unusually(&mut self, setpoint: Setpoint) -> Setpoint {
-        if setpoint.done {
-            if let Some(playing) = self.playing.take() {
-                self.give_back(playing.table, false);
-            }
-            self.has_played = true;
-            return setpoint;
-        }
-        let Some(playing) = &mut self.playing else { return setpoint };
-        let Some(warp) = &playing.table.header().warp else {
-            playing.clock.advance();
-            return setpoint;
-        };
-        let pace = self.rate.advance(warp);
-        self.lag = self.lag.saturating_add(playing.clock.advance_at(pace.mean));
-        self.delay();
-        at_pace(&setpoint, &pace, self.per_s)
-    }
-
-    /// What is lost of path time puts off all that is planned, tick by whole tick.
-    fn delay(&mut self) {
-        let tick = self.tick_time;
-        let late = if self.lag >= tick {
-            1
-        } else if self.lag <= tick.saturating_neg() {
-            -1
-        } else {
-            return;
-        };
-        self.lag = self.lag.saturating_sub(tick.saturating_mul(late));
-        if let Some(playing) = &mut self.playing {
-            playing.end = playing.end.saturating_add_signed(late);
-        }
-        if let Some(armed) = &mut self.armed {
-            armed.tick = armed.tick.saturating_add_signed(late);
-        }
     }
 
     /// The next set-point of a motion without a table.
@@ -671,31 +377,6 @@ impl<'a> Motion<'a> {
     /// Something moves or is about to.
     fn moves(&self) -> bool {
         !self.last.done || self.excursion.is_some() || self.playing.is_some() || self.armed.is_some()
-    }
-
-    fn refuse_without_torque(&self) -> Result<(), Reject> {
-        match (self.fault, self.power) {
-            (Some(_), _) => Err(Reject::Fault),
-            (None, Power::OperationEnabled) => Ok(()),
-            (None, power) => Err(Reject::Power(power)),
-        }
-    }
-
-    fn refuse_to_stray(&self) -> Result<(), Reject> {
-        self.refuse_without_torque()?;
-        if self.playing.is_some() || self.armed.is_some() { Err(Reject::Busy) } else { Ok(()) }
-    }
-}
-
-/// A set-point of the path at another rate: v s, a s^2 + v s'.
-fn at_pace(setpoint: &Setpoint, pace: &Pace, per_s: f32) -> Setpoint {
-    let Setpoint { position, velocity, acceleration, done } = *setpoint;
-    let change = pace.change * per_s;
-    Setpoint {
-        position,
-        velocity: velocity * pace.s,
-        acceleration: acceleration * pace.s * pace.s + velocity * change,
-        done,
     }
 }
 

@@ -63,6 +63,12 @@ pub fn player<'a>(
 
 /// Sends a drive its table; whether it is ready to play it.
 pub fn bring(player: &mut Player<'_>, packed: &Packed, axis: usize) -> bool {
+    send(player, packed, axis);
+    matches!(player.poll_answer(), Some(DriveMessage::Ready { .. }))
+}
+
+/// Sends a drive its table.
+pub fn send(player: &mut Player<'_>, packed: &Packed, axis: usize) {
     let part = &packed.axes[axis];
     let table = packed.header.table;
     player.handle(&HostMessage::Open(packed.header));
@@ -75,5 +81,4 @@ pub fn bring(player: &mut Player<'_>, packed: &Packed, axis: usize) -> bool {
         }
         player.handle(&HostMessage::Seal { table, part: kind, crc });
     }
-    matches!(player.poll_answer(), Some(DriveMessage::Ready { .. }))
 }

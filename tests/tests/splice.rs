@@ -9,10 +9,10 @@ use planner::feed::table::FeedTable;
 use planner::job::gcode::Options;
 use planner::job::machine::{AxisLimits, LimitSet, Machine, OverrideRule};
 use planner::topp::horizon::{Deadline, Horizon, HorizonSettings, Record, pieces};
-use protocol::message::{DriveMessage, HostMessage, Part, Reject, State};
+use protocol::message::{DriveMessage, HostMessage, Reject, State};
 use protocol::power::Power;
 use tests::chain;
-use tests::drives::player;
+use tests::drives::{player, send};
 use tests::meander::{limits, meander};
 use tests::tables::{Random, TICK_NS};
 
@@ -96,19 +96,8 @@ type Player<'a> = firmware_core::player::Player<'a>;
 
 /// Sends a piece and asks for its start; what the drive says.
 fn bring(player: &mut Player<'_>, packed: &Packed, axis: usize) -> Vec<DriveMessage> {
-    let part = &packed.axes[axis];
-    let table = packed.header.table;
-    player.handle(&HostMessage::Open(packed.header));
-    player.handle(&HostMessage::OpenAxis(part.header));
-    for (kind, bytes, crc) in
-        [(Part::Shared, &packed.shared, packed.shared_crc()), (Part::Axis, &part.controls, part.crc())]
-    {
-        for (k, bytes) in bytes.chunks(300).enumerate() {
-            player.handle(&HostMessage::Data { table, part: kind, offset: 300 * k as u32, bytes });
-        }
-        player.handle(&HostMessage::Seal { table, part: kind, crc });
-    }
-    player.handle(&HostMessage::Start { table, tick: 0 });
+    send(player, packed, axis);
+    player.handle(&HostMessage::Start { table: packed.header.table, tick: 0 });
     std::iter::from_fn(|| player.poll_answer()).collect()
 }
 
