@@ -243,7 +243,10 @@ impl<'a> Intake<'a> {
         }
         match order(orders, Order::Power(event)) {
             Err(_) if urgent => {
-                self.urgent = Some(event);
+                // Without torque there is no more to stop.
+                if self.urgent != Some(PowerEvent::DisableVoltage) {
+                    self.urgent = Some(event);
+                }
                 Ok(())
             }
             result => result,

@@ -266,11 +266,13 @@ impl<'a> Motion<'a> {
         if due && let Err(fault) = self.begin() {
             return self.fail_now(fault);
         }
+        // What is given at this tick is at the rate that it begins with.
+        let plain = self.rate.is_plain();
         let setpoint = match self.play() {
             Ok(setpoint) => setpoint,
             Err(fault) => return self.fail_now(fault),
         };
-        match self.guard.check(&setpoint, self.last.position, self.rate.is_plain()) {
+        match self.guard.check(&setpoint, self.last.position, plain) {
             Ok(()) => setpoint,
             Err(limit) => self.fail_now(Fault::Limit(limit)),
         }

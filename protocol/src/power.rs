@@ -57,7 +57,7 @@ use PowerEvent as E;
 ///
 /// Number 4 may be taken from [`Power::ReadyToSwitchOn`] as 3 and 4 in one; number 13 is possible everywhere but where
 /// a fault is latched already.
-pub const TRANSITIONS: [(u8, Power, PowerEvent, Power); 28] = [
+pub const TRANSITIONS: [(u8, Power, PowerEvent, Power); 29] = [
     (2, SwitchOnDisabled, E::Shutdown, ReadyToSwitchOn),
     (3, ReadyToSwitchOn, E::SwitchOn, SwitchedOn),
     (4, SwitchedOn, E::EnableOperation, OperationEnabled),
@@ -87,6 +87,7 @@ pub const TRANSITIONS: [(u8, Power, PowerEvent, Power); 28] = [
     (0, SwitchedOn, E::SwitchOn, SwitchedOn),
     (0, OperationEnabled, E::EnableOperation, OperationEnabled),
     (0, SwitchOnDisabled, E::DisableVoltage, SwitchOnDisabled),
+    (0, QuickStopActive, E::QuickStop, QuickStopActive),
 ];
 
 impl Power {

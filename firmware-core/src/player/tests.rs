@@ -58,6 +58,11 @@ fn header(table: u32, geometry_bytes: u32, span_bytes: u32) -> TableHeader {
 
 /// A straight move of 8 u in one geometry span and five q spans, from 100 to 8100 counts.
 fn bring(player: &mut Player<'_>, table: u32) {
+    bring_with(player, table, WARP);
+}
+
+/// The same with other bounds of overrides.
+fn bring_with(player: &mut Player<'_>, table: u32, warp: Warp) {
     let (mut shared, mut spans, mut writer) = (Vec::new(), Vec::new(), SpanWriter::default());
     geometry::write(&mut shared, GeometrySpan { length: 2048, spans: 5 });
     writer.push(&mut spans, Some(200), None);
@@ -67,7 +72,7 @@ fn bring(player: &mut Player<'_>, table: u32) {
     writer.push(&mut spans, None, None);
     let (mut controls, mut points) = (Vec::new(), ControlWriter::default());
     [0, 8000, 16_000, 24_000].into_iter().for_each(|p| points.push(&mut controls, p / 3 + 100));
-    let header = header(table, shared.len() as u32, spans.len() as u32);
+    let header = TableHeader { warp: Some(warp), ..header(table, shared.len() as u32, spans.len() as u32) };
     shared.extend(spans);
     let control_bytes = controls.len() as u32;
     let axis =

@@ -1,6 +1,7 @@
 //! Override and hold.
 
 use super::*;
+use crate::axis::Excess;
 
 fn refusal(player: &mut Player<'_>) -> Option<Reject> {
     core::iter::from_fn(|| player.poll_answer()).find_map(|answer| match answer {
@@ -123,5 +124,30 @@ fn a_quick_stop_out_of_a_hold_stands_where_it_stands() {
     let plain = plain();
     for full in plain {
         assert_eq!(player.tick(), full);
+    }
+}
+
+/// The last tick of a ramp still has its share of the ramp's acceleration: it counts as one at another rate.
+#[test]
+fn the_end_of_a_ramp_is_no_fault() {
+    let plain = plain();
+    let acceleration = plain.iter().map(|s| s.acceleration.abs()).fold(0.0, f32::max);
+    for tick in 40..240 {
+        let (mut a, mut b) = ([0; 64], [0; 64]);
+        let mut player = enabled(config(), &mut a, &mut b);
+        bring_with(&mut player, 4, Warp { bend: RATE_ONE / 1_000_000 * 1_500, ..WARP });
+        assert_eq!(refusal(&mut player), None);
+        // At rate 1 as much as the table needs, at others as much as there may be.
+        let limits = Limits { acceleration, ..LIMITS };
+        let excess = Excess { acceleration: 1e3, jerk: 1e3 };
+        player.motion.set_guard(Guard::new(&AxisConfig { limits, excess, ..config() }));
+        player.handle(&HostMessage::Start { table: 4, tick: 0 });
+        player.handle(&HostMessage::Override { permille: 900, tick });
+        (0..tick + 60).for_each(|_| {
+            player.tick();
+        });
+        player.handle(&HostMessage::Override { permille: 1000, tick: tick + 60 });
+        while !player.tick().done {}
+        assert_eq!((player.status().fault, player.status().position), (None, 8_100), "{tick}");
     }
 }
