@@ -42,6 +42,9 @@ impl Setpoint {
     }
 }
 
+/// No span has this number.
+const NO_KNOT: u32 = u32::MAX;
+
 /// A place in a table that plays.
 #[derive(Clone, Copy, Debug)]
 pub struct Cursor {
@@ -80,7 +83,7 @@ impl Cursor {
     pub fn evaluate(&mut self, table: &CheckedTable<'_>, time: u64) -> Result<Setpoint, TableError> {
         let mut local = time.saturating_sub(self.began);
         if local >= self.law.duration() {
-            self.pass(table, time)?;
+            self.approach(table, time, NO_KNOT)?;
             local = time.saturating_sub(self.began);
         }
         if !self.law.is_last() {
@@ -94,6 +97,7 @@ impl Cursor {
     }
 
     /// Goes on to the span of a time, but not beyond the knot before span `knot`; whether the time has reached it.
+    #[inline(never)]
     pub(crate) fn approach(
         &mut self,
         table: &CheckedTable<'_>,
@@ -112,15 +116,6 @@ impl Cursor {
     /// The start of a table that goes on where this one is, at the end of its span.
     pub(crate) fn joined(&self, table: &CheckedTable<'_>) -> Result<Self, TableError> {
         Ok(Self { began: self.began.saturating_add(self.law.duration()), ..Self::new(table)? })
-    }
-
-    /// Goes on to the span of a time.
-    #[inline(never)]
-    fn pass(&mut self, table: &CheckedTable<'_>, time: u64) -> Result<(), TableError> {
-        while !self.law.is_last() && time.saturating_sub(self.began) >= self.law.duration() {
-            self.step(table)?;
-        }
-        Ok(())
     }
 
     /// Goes on by a span.

@@ -199,7 +199,7 @@ impl<'a> Intake<'a> {
             Ok(DriveMessage::Ready { table: number, ticks, crc })
         };
         let result = self.incoming(number, fits);
-        let result = if self.joins(number) { result } else { result.and(Err(Reject::Joint)) };
+        let result = result.and_then(|ready| if self.joins(number) { Ok(ready) } else { Err(Reject::Joint) });
         match result {
             Ok(ready) => {
                 self.answer(ready);

@@ -259,7 +259,8 @@ impl<'a> Motion<'a> {
         if let Some(change) = &self.change
             && change.tick <= self.tick
         {
-            self.rate.aim(change.target);
+            let target = change.target;
+            self.rate.aim(self.playing.as_ref().map_or(target, |p| p.table.nearest_rate(target)));
             self.change = None;
         }
         let due = self.armed.as_ref().is_some_and(|armed| armed.tick <= self.tick);
@@ -327,10 +328,12 @@ impl<'a> Motion<'a> {
     #[inline(never)]
     fn land(&mut self) {
         let lands = self.excursion.as_ref().is_some_and(|way| way.stops);
-        if !lands && !self.last.done {
+        if !lands {
             let AxisConfig { limits, tick_ns, .. } = self.config;
-            // Without one, as when the set-point is no number, standing still at once is all that is left.
-            let course = Course::to_velocity(&self.last, 0.0, &limits, tick_ns).ok();
+            // Without one, as when the set-point is no number, standing still at once is all that is left. A move that was
+            // ordered since the last tick has not begun.
+            let course = || Course::to_velocity(&self.last, 0.0, &limits, tick_ns).ok();
+            let course = if self.last.done { None } else { course() };
             self.excursion = course.map(|course| Excursion { course, stops: true });
         }
         self.drop_tables();

@@ -1,6 +1,7 @@
 //! Memory for one table, filled in order and checked when it is complete.
 
 use protocol::message::{Part, Reject, part_crc};
+use protocol::table::warp::RATE_ONE;
 use protocol::table::{AxisHeader, TableHeader};
 
 use crate::table::{CheckedTable, TableView, Tail};
@@ -76,6 +77,11 @@ impl<'a> Loaded<'a> {
     /// Path time, from its start, at which another table may take over [2^-32 s].
     pub(crate) fn tail(&self) -> Option<u64> {
         self.tail
+    }
+
+    /// Of the rates of path time that the table admits the one nearest to another one [2^-48].
+    pub(crate) fn nearest_rate(&self, target: u64) -> u64 {
+        self.header.warp.map_or(RATE_ONE, |warp| target.min(u64::from(warp.rate) << 24))
     }
 
     /// The table; there always is one.

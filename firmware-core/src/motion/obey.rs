@@ -64,7 +64,9 @@ impl<'a> Motion<'a> {
         if table.axis().start != position {
             return Err(Reject::Position { position });
         }
-        if table.header().warp.is_none() && !self.rate.is_plain() {
+        // A rate that is to come counts as well.
+        let plain = self.rate.is_plain() && self.change.is_none();
+        if table.header().warp.is_none() && !plain {
             return Err(Reject::Override);
         }
         Ok(())
@@ -159,9 +161,8 @@ impl<'a> Motion<'a> {
             return Err(Reject::Late { tick: self.tick });
         }
         let target = of_permille(permille);
-        let admitted = self.playing.as_ref().is_none_or(|playing| {
-            playing.table.header().warp.is_some_and(|warp| target <= u64::from(warp.rate) << 24)
-        });
+        let tables = [self.playing.as_ref().map(|p| &p.table), self.armed.as_ref().map(|a| &a.table)];
+        let admitted = tables.into_iter().flatten().all(|table| table.nearest_rate(target) == target);
         if permille > MOST_PERMILLE || !admitted {
             return Err(Reject::Override);
         }

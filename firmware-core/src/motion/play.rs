@@ -1,7 +1,6 @@
 //! How tables play: they begin, take over from each other, change their rate and end.
 
 use protocol::message::Fault;
-use protocol::table::warp::RATE_ONE;
 
 use super::{Armed, Motion};
 use crate::evaluate::{Cursor, Setpoint};
@@ -57,8 +56,7 @@ impl Motion<'_> {
             None => return Ok(()),
         };
         // At rest the rate may be what it will.
-        let most = table.header().warp.map_or(RATE_ONE, |warp| u64::from(warp.rate) << 24);
-        self.rate.aim(self.rate.target().min(most));
+        self.rate.aim(table.nearest_rate(self.rate.target()));
         self.rate.jump();
         self.lag = 0;
         let clock = PathClock::new(self.config.tick_ns);

@@ -7,7 +7,7 @@ use protocol::table::control::ControlWriter;
 use protocol::table::geometry::{self, GeometrySpan};
 use protocol::table::span::SpanWriter;
 use protocol::table::warp::{ONE, RATE_ONE, Warp};
-use protocol::table::{AxisHeader, FORMAT_VERSION, Stream, TableError};
+use protocol::table::{AxisHeader, FORMAT_VERSION, HeaderField, Stream, TableError};
 use protocol::table::{AxisLimit, Limits, TableHeader};
 
 extern crate std;
@@ -37,6 +37,17 @@ fn enabled<'a>(config: AxisConfig, a: &'a mut [u8], b: &'a mut [u8]) -> Player<'
     player
 }
 
+/// The one refusal among the answers.
+fn refusal(player: &mut Player<'_>) -> Option<Reject> {
+    let mut reasons = core::iter::from_fn(|| player.poll_answer()).filter_map(|answer| match answer {
+        DriveMessage::Reject { reason, .. } => Some(reason),
+        _ => None,
+    });
+    let first = reasons.next();
+    assert_eq!(reasons.next(), None);
+    first
+}
+
 /// Its shared header.
 fn header(table: u32, geometry_bytes: u32, span_bytes: u32) -> TableHeader {
     TableHeader {
@@ -61,8 +72,12 @@ fn bring(player: &mut Player<'_>, table: u32) {
     bring_with(player, table, WARP);
 }
 
-/// The same with other bounds of overrides.
 fn bring_with(player: &mut Player<'_>, table: u32, warp: Warp) {
+    bring_warped(player, table, Some(warp));
+}
+
+/// The same with other bounds of overrides.
+fn bring_warped(player: &mut Player<'_>, table: u32, warp: Option<Warp>) {
     let (mut shared, mut spans, mut writer) = (Vec::new(), Vec::new(), SpanWriter::default());
     geometry::write(&mut shared, GeometrySpan { length: 2048, spans: 5 });
     writer.push(&mut spans, Some(200), None);
@@ -72,7 +87,7 @@ fn bring_with(player: &mut Player<'_>, table: u32, warp: Warp) {
     writer.push(&mut spans, None, None);
     let (mut controls, mut points) = (Vec::new(), ControlWriter::default());
     [0, 8000, 16_000, 24_000].into_iter().for_each(|p| points.push(&mut controls, p / 3 + 100));
-    let header = TableHeader { warp: Some(warp), ..header(table, shared.len() as u32, spans.len() as u32) };
+    let header = TableHeader { warp, ..header(table, shared.len() as u32, spans.len() as u32) };
     shared.extend(spans);
     let control_bytes = controls.len() as u32;
     let axis =

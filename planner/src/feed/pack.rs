@@ -149,8 +149,8 @@ pub(super) fn pack_cut(
 ) -> Result<Packed, PackError> {
     let tick_ns = target.tick_ns;
     check_shape(table, target.axes.len())?;
-    check_times(table, tick_ns)?;
     let first = cut.from.map_or(0, |(span, _)| span);
+    check_times(table, first, tick_ns)?;
     let knot = knot_of(table, first)?;
     let mut shared = Vec::new();
     write_geometry(table, first, knot, &mut shared)?;
@@ -212,11 +212,11 @@ fn check_shape(table: &FeedTable, scales: usize) -> Result<(), PackError> {
 }
 
 /// The rules on bend and duration, on the law as the planner evaluates it.
-fn check_times(table: &FeedTable, tick_ns: u32) -> Result<(), PackError> {
+fn check_times(table: &FeedTable, first: usize, tick_ns: u32) -> Result<(), PackError> {
     let longest = rules::MAX_SPAN_TIME as f64 / f64::from(rules::PATH_TIME_PER_S) * (1.0 - FORMAT_MARGIN);
     let shortest = f64::from(tick_ns) * 1e-9 / rules::MAX_SPANS_PER_TICK as f64 * (1.0 + FORMAT_MARGIN);
-    for i in 0..table.spans() {
-        let (law, index) = (table.law(i), i as u32);
+    for i in first..table.spans() {
+        let (law, index) = (table.law(i), (i - first) as u32);
         if let SpanLaw::Quadratic { h, q: [alpha, beta, gamma] } = law {
             let w = h / (alpha.max(0.0).sqrt() + (alpha + h * (beta + h * gamma)).max(0.0).sqrt());
             let bend = gamma * w * w;

@@ -4,17 +4,6 @@ use super::*;
 use crate::axis::{FaultOption, LostOption, Options, QuickStopOption};
 use protocol::power::TRANSITIONS;
 
-/// The one refusal among the answers.
-fn refusal(player: &mut Player<'_>) -> Option<Reject> {
-    let mut reasons = core::iter::from_fn(|| player.poll_answer()).filter_map(|answer| match answer {
-        DriveMessage::Reject { reason, .. } => Some(reason),
-        _ => None,
-    });
-    let first = reasons.next();
-    assert_eq!(reasons.next(), None);
-    first
-}
-
 fn with(options: Options) -> AxisConfig {
     AxisConfig { options, ..config() }
 }
@@ -268,4 +257,24 @@ fn a_velocity_is_kept_until_told_otherwise_and_ends_with_the_travel() {
     assert_eq!(stand(&mut player), 5_000);
     player.handle(&HostMessage::MoveAt { velocity: -1e5 });
     assert_eq!(stand(&mut player), -5_000);
+}
+
+#[test]
+fn a_quick_stop_before_a_move_has_begun_keeps_the_axis_where_it_is() {
+    let moves =
+        [HostMessage::MoveTo { position: 100_000, velocity: None }, HostMessage::MoveAt { velocity: 1e5 }];
+    for order in moves {
+        for fault in [false, true] {
+            let (mut a, mut b) = ([0; 64], [0; 64]);
+            let mut player = enabled(config(), &mut a, &mut b);
+            player.handle(&order);
+            if fault {
+                player.trip(1);
+            } else {
+                player.handle(&HostMessage::QuickStop);
+            }
+            assert!((0..50).all(|_| player.tick() == Setpoint::at_rest(100)), "{order:?}");
+            assert_eq!(player.status().power, if fault { Power::Fault } else { Power::QuickStopActive });
+        }
+    }
 }

@@ -3,13 +3,6 @@
 use super::*;
 use crate::axis::Excess;
 
-fn refusal(player: &mut Player<'_>) -> Option<Reject> {
-    core::iter::from_fn(|| player.poll_answer()).find_map(|answer| match answer {
-        DriveMessage::Reject { reason, .. } => Some(reason),
-        _ => None,
-    })
-}
-
 /// All set-points of the table at rate 1.
 fn plain() -> Vec<Setpoint> {
     let (mut a, mut b) = ([0; 64], [0; 64]);
@@ -149,5 +142,38 @@ fn the_end_of_a_ramp_is_no_fault() {
         player.handle(&HostMessage::Override { permille: 1000, tick: tick + 60 });
         while !player.tick().done {}
         assert_eq!((player.status().fault, player.status().position), (None, 8_100), "{tick}");
+    }
+}
+
+#[test]
+fn bounds_that_do_not_suit_the_axis_are_refused() {
+    let header = TableError::Header(HeaderField::Warp);
+    for (warp, reason) in [
+        (Warp { slope: WARP.slope * 3, ..WARP }, Reject::Table(header)),
+        (Warp { bend: RATE_ONE / 1_000_000 * 3_000, ..WARP }, Reject::Table(header)),
+        (Warp { acceleration: ONE + ONE / 2, ..WARP }, Reject::Limits),
+        (Warp { rate: ONE + ONE / 20, ..WARP }, Reject::Limits),
+    ] {
+        let (mut a, mut b) = ([0; 64], [0; 64]);
+        let mut player = enabled(config(), &mut a, &mut b);
+        bring_with(&mut player, 4, warp);
+        assert_eq!(refusal(&mut player), Some(reason), "{warp:?}");
+    }
+}
+
+/// A table that admits no other rate is not started when there is to be one, nor is there one while it waits.
+#[test]
+fn a_table_without_bounds_keeps_to_rate_1() {
+    for change_first in [true, false] {
+        let (mut a, mut b) = ([0; 64], [0; 64]);
+        let mut player = enabled(config(), &mut a, &mut b);
+        bring_warped(&mut player, 4, None);
+        let messages =
+            [HostMessage::Override { permille: 0, tick: 30 }, HostMessage::Start { table: 4, tick: 20 }];
+        let [first, second] = if change_first { [0, 1] } else { [1, 0] };
+        player.handle(&messages[first]);
+        assert_eq!(refusal(&mut player), None);
+        player.handle(&messages[second]);
+        assert_eq!(refusal(&mut player), Some(Reject::Override));
     }
 }
