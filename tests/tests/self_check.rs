@@ -12,6 +12,7 @@ use planner::job::machine::{LimitSet, Machine};
 use protocol::table::rules::USUAL_MARGIN;
 use protocol::table::{AxisHeader, AxisLimit, Limits, TableError, TableHeader};
 use tests::chain;
+use tests::drives::asked;
 use tests::tables::{COARSE, FINE, Random, Sample};
 
 const TICK_NS: u32 = 1_000_000;
@@ -101,7 +102,6 @@ fn what_the_planner_packs_is_proven() {
 /// `FEEDSPLINE_CASES` asks for so many tables, `FEEDSPLINE_SEED` for others.
 #[test]
 fn no_table_that_breaks_its_limits_is_accepted() {
-    let asked = |name, default| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default);
     let (cases, seed): (u64, u64) = (asked("FEEDSPLINE_CASES", 20_000), asked("FEEDSPLINE_SEED", 1));
     let mut random = Random::new(seed);
     let mut told = BTreeMap::<&str, u64>::new();
