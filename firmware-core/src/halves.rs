@@ -2,8 +2,11 @@
 //! two queues with one producer and one consumer each (Lamport 1977). Neither half ever waits for the other: the tick finds
 //! an order or it does not, and a table belongs to one half at a time.
 
+use core::sync::atomic::{AtomicU32, Ordering};
+
 use heapless::spsc::{Consumer, Producer, Queue};
 use protocol::bus::Frame;
+use protocol::bus::sync::{Stamp, nearest};
 
 use crate::drive::{DriveConfig, Station};
 use crate::evaluate::Setpoint;
@@ -17,12 +20,14 @@ pub struct Between<'a> {
     // One place of a queue stays empty.
     orders: Queue<Order<'a>, { ORDERS + 1 }>,
     reports: Queue<Report<'a>, { REPORTS + 1 }>,
+    /// Lowest bits of the tick that is under way.
+    tick: AtomicU32,
 }
 
 impl<'a> Between<'a> {
     /// Nothing is on its way.
     pub const fn new() -> Self {
-        Self { orders: Queue::new(), reports: Queue::new() }
+        Self { orders: Queue::new(), reports: Queue::new(), tick: AtomicU32::new(0) }
     }
 
     /// A drive at rest and without torque, with two buffers for tables: the half that talks and the half that moves.
@@ -34,8 +39,9 @@ impl<'a> Between<'a> {
     ) -> (Talk<'q, 'a>, Move<'q, 'a>) {
         let (orders, next) = self.orders.split();
         let (reports, heard) = self.reports.split();
-        let talk = Talk { station: Station::new(config, a, b), out: Outgoing(orders), heard };
-        (talk, Move { motion: Motion::new(config.axis), ends: Ends { next, reports } })
+        let tick = &self.tick;
+        let talk = Talk { station: Station::new(config, a, b), out: Outgoing(orders), heard, tick, now: 0 };
+        (talk, Move { motion: Motion::new(config.axis), ends: Ends { next, reports }, tick })
     }
 }
 
@@ -45,6 +51,9 @@ pub struct Talk<'q, 'a> {
     station: Station<'a>,
     out: Outgoing<'q, 'a>,
     heard: Consumer<'q, Report<'a>>,
+    tick: &'q AtomicU32,
+    /// The tick that was under way at the last look.
+    now: u64,
 }
 
 /// The half that moves: it belongs to the control interrupt.
@@ -52,6 +61,7 @@ pub struct Talk<'q, 'a> {
 pub struct Move<'q, 'a> {
     motion: Motion<'a>,
     ends: Ends<'q, 'a>,
+    tick: &'q AtomicU32,
 }
 
 struct Outgoing<'q, 'a>(Producer<'q, Order<'a>>);
@@ -90,29 +100,45 @@ impl<'a> Link<'a> for Ends<'_, 'a> {
 }
 
 impl Talk<'_, '_> {
-    /// Takes a frame from the bus; frames of others are ignored.
-    pub fn receive(&mut self, frame: &Frame) {
-        self.hear();
-        self.station.receive(frame, &mut self.out);
+    /// Takes a frame from the bus that has ended so long after the present tick began [ns]; frames of others are ignored.
+    pub fn receive(&mut self, frame: &Frame, ns: u32) {
+        let at = self.hear(ns);
+        self.station.receive(frame, at, &mut self.out);
     }
 
     /// The next frame to send. Call it all the time: what the motion has to say is heard here.
     pub fn poll_transmit(&mut self) -> Option<Frame> {
-        self.hear();
-        self.station.poll_transmit()
+        let now = self.hear(0);
+        self.station.poll_transmit(now)
     }
 
-    fn hear(&mut self) {
+    /// A frame that was fetched has left the drive, so long after the present tick began [ns].
+    pub fn sent(&mut self, frame: &Frame, ns: u32) {
+        let at = self.hear(ns);
+        self.station.sent(frame, at);
+    }
+
+    /// By how much the next tick is to be shorter [1e-9].
+    pub fn trim_ppb(&mut self) -> i32 {
+        let now = self.hear(0);
+        self.station.clock().trim_ppb(now)
+    }
+
+    fn hear(&mut self, ns: u32) -> Stamp {
+        self.now = nearest(self.now, self.tick.load(Ordering::Relaxed));
+        let at = Stamp { tick: self.now, ns };
         while let Some(report) = self.heard.dequeue() {
-            self.station.hear(report);
+            self.station.hear(report, at);
         }
         self.station.retry(&mut self.out);
+        at
     }
 }
 
 impl<'a> Move<'_, 'a> {
     /// The set-point of this tick; call it once per control tick.
     pub fn tick(&mut self) -> Setpoint {
+        self.tick.store(self.motion.now() as u32, Ordering::Relaxed);
         self.motion.tick(&mut self.ends)
     }
 

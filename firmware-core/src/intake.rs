@@ -5,14 +5,14 @@
 //! keeps them. All of this takes its time, and none of it happens in the control tick.
 
 use heapless::Deque;
-use protocol::message::{DriveMessage, HostMessage, Identity, Reject, State, Status};
+use protocol::message::{DriveMessage, HostMessage, Identity, Part, Reject, State, Status};
 use protocol::power::PowerEvent;
 use protocol::schema;
 use protocol::table::{FORMAT_VERSION, HeaderField, Limits, TableError, TableHeader};
 
 use crate::axis::AxisConfig;
 use crate::orders::{Order, Report};
-use crate::store::{Loaded, Slot};
+use crate::store::{Loaded, Sealed, Slot};
 use crate::time::ticks_until;
 
 /// Most answers that wait to be sent; when they are not fetched, status is dropped first.
@@ -53,12 +53,30 @@ pub struct Intake<'a> {
     answers: Deque<DriveMessage, ANSWERS>,
     /// A quick stop that found no room.
     urgent: Option<PowerEvent>,
+    /// Number of the last table that was handed over, plus one.
+    committed: u32,
+    /// And of the one before it.
+    before: u32,
+    /// Number of the last change of rate that was ordered.
+    change: u8,
+    boot: u32,
+    epoch: u16,
 }
 
 impl<'a> Intake<'a> {
     /// With two buffers for tables.
     pub fn new(config: AxisConfig, a: &'a mut [u8], b: &'a mut [u8]) -> Self {
-        Self { config, slots: [Slot::new(a), Slot::new(b)], answers: Deque::new(), urgent: None }
+        Self {
+            config,
+            slots: [Slot::new(a), Slot::new(b)],
+            answers: Deque::new(),
+            urgent: None,
+            committed: 0,
+            before: 0,
+            change: 0,
+            boot: 0,
+            epoch: 0,
+        }
     }
 
     /// Takes a message; answers wait in [`Intake::poll_answer`].
@@ -69,13 +87,14 @@ impl<'a> Intake<'a> {
             HostMessage::OpenAxis(axis) => {
                 (axis.table, self.incoming(axis.table, |slot| slot.open_axis(axis)))
             }
-            HostMessage::Data { table, part, offset, bytes } => {
-                (table, self.incoming(table, |slot| slot.data(part, offset, bytes)))
+            HostMessage::Data { tag, part, unit, bytes } => {
+                // The seal tells what is missing.
+                if let Some(slot) = self.slots.iter_mut().find(|slot| slot.has_tag(tag)) {
+                    let _ = slot.data(part, unit, bytes);
+                }
+                (0, Ok(()))
             }
-            HostMessage::Seal { table, part, crc } => {
-                let complete = self.incoming(table, |slot| slot.seal(part, crc));
-                (table, complete.and_then(|complete| if complete { self.check(table) } else { Ok(()) }))
-            }
+            HostMessage::Seal { table, part, crc } => (table, self.seal(table, part, crc)),
             HostMessage::Start { table, tick } => (table, self.start(table, tick, orders)),
             HostMessage::Stop => {
                 self.forget();
@@ -85,12 +104,21 @@ impl<'a> Intake<'a> {
                 (0, order(orders, Order::MoveTo { position, velocity }))
             }
             HostMessage::MoveAt { velocity } => (0, order(orders, Order::MoveAt { velocity })),
-            HostMessage::Override { permille, tick } => {
-                (0, order(orders, Order::Override { permille, tick }))
+            // Repeats make sure that everybody has heard.
+            HostMessage::Override { number, .. } if number == self.change && number != 0 => (0, Ok(())),
+            HostMessage::Override { permille, tick, number } => {
+                let result = order(orders, Order::Override { permille, tick });
+                if result.is_ok() {
+                    self.change = number;
+                }
+                (0, result)
             }
             HostMessage::QuickStop => (0, self.power(PowerEvent::QuickStop, orders)),
             HostMessage::Power(event) => (0, self.power(event, orders)),
             HostMessage::Alive => (0, order(orders, Order::Alive)),
+            HostMessage::Report => (0, order(orders, Order::Report)),
+            // The session has answered it.
+            HostMessage::Begin { .. } => (0, Ok(())),
             HostMessage::Identify => {
                 let identity = self.identity();
                 self.answer(DriveMessage::Identity(identity));
@@ -110,10 +138,13 @@ impl<'a> Intake<'a> {
             Report::Status(status) if self.answers.len() < ANSWERS / 2 => {
                 self.answer(DriveMessage::Status(self.seen(status)));
             }
+            Report::Reported(status) => self.answer(DriveMessage::Status(self.seen(status))),
             Report::Telemetry(telemetry) if self.answers.len() < ANSWERS / 2 => {
                 self.answer(DriveMessage::Telemetry(telemetry));
             }
             Report::Status(_) | Report::Telemetry(_) => {}
+            // These are the session's.
+            Report::Cleared(_) | Report::Shifted { .. } => {}
         }
     }
 
@@ -124,6 +155,49 @@ impl<'a> Intake<'a> {
         {
             orders.send(Order::Power(event));
         }
+    }
+
+    /// Tables that it could take.
+    pub(crate) fn free(&self) -> u8 {
+        self.slots.iter().filter(|slot| !slot.is_away()).count() as u8
+    }
+
+    /// Lowest bits of the last table that was handed over, plus one.
+    pub(crate) fn committed(&self) -> u8 {
+        self.committed as u8
+    }
+
+    /// A table that takes over from another one has been handed over on another drive: all were ready for it, so it is here too.
+    pub(crate) fn adopt(&mut self, committed: u8, orders: &mut dyn Orders<'a>) {
+        let joins = |slot: &&Slot<'a>| {
+            slot.is_ready() && slot.headers().is_some_and(|(header, _)| header.joint.is_some())
+        };
+        let slot = self.slots.iter().filter(joins).find_map(Slot::number);
+        if let Some(number) =
+            slot.filter(|&number| (number as u8).wrapping_add(1) == committed && orders.has_room())
+        {
+            let _ = self.start(number, 0, orders);
+        }
+    }
+
+    /// Nothing has been handed over yet.
+    pub(crate) fn begin_anew(&mut self) {
+        (self.committed, self.before, self.change) = (0, 0, 0);
+    }
+
+    /// Number of the last change of rate.
+    pub(crate) fn change(&self) -> u8 {
+        self.change
+    }
+
+    /// Forgets tables that were not handed over.
+    pub(crate) fn forget(&mut self) {
+        self.slots.iter_mut().for_each(Slot::clear);
+    }
+
+    /// Says something of the session.
+    pub(crate) fn say(&mut self, message: DriveMessage) {
+        self.answer(message);
     }
 
     /// The oldest answer that was not fetched.
@@ -148,19 +222,28 @@ impl<'a> Intake<'a> {
         Status { state, ..status }
     }
 
+    /// Tells what the session is: start-up and newest epoch.
+    pub(crate) fn set_session(&mut self, boot: u32, epoch: u16) {
+        (self.boot, self.epoch) = (boot, epoch);
+    }
+
     /// Who the axis is.
     pub fn identity(&self) -> Identity {
         let AxisConfig { axis, tick_ns, limits, .. } = self.config;
         let room = self.slots.iter().map(Slot::room).min().unwrap_or(0);
         let room = u32::try_from(room).unwrap_or(u32::MAX);
         let (format, schema) = (FORMAT_VERSION, schema::HASH);
-        Identity { version: VERSION, format, schema, axis, tick_ns, limits, room }
+        let (boot, epoch) = (self.boot, self.epoch);
+        Identity { version: VERSION, format, schema, axis, tick_ns, limits, room, boot, epoch }
     }
 
     #[inline(never)]
     fn open(&mut self, header: TableHeader) -> Result<(), Reject> {
         if header.tick_ns != self.config.tick_ns {
             return Err(Reject::Tick { tick_ns: self.config.tick_ns });
+        }
+        if self.slots.iter().any(|slot| slot.is_opened_by(&header)) {
+            return Ok(());
         }
         self.forget();
         if self.slots.iter().any(|slot| slot.number() == Some(header.table)) {
@@ -177,6 +260,18 @@ impl<'a> Intake<'a> {
         act: impl FnOnce(&mut Slot<'a>) -> Result<T, Reject>,
     ) -> Result<T, Reject> {
         act(self.slot(table).filter(|slot| !slot.is_away()).ok_or(Reject::NotOpen)?)
+    }
+
+    /// Ends a part; a table that has become complete is checked.
+    fn seal(&mut self, table: u32, part: Part, crc: u32) -> Result<(), Reject> {
+        match self.incoming(table, |slot| slot.seal(part, crc))? {
+            Sealed::Half => Ok(()),
+            Sealed::Whole => self.check(table),
+            Sealed::Missing(gaps) => {
+                self.answer(DriveMessage::Missing { table, part, gaps });
+                Ok(())
+            }
+        }
     }
 
     /// Checks a complete table, and says so.
@@ -232,6 +327,7 @@ impl<'a> Intake<'a> {
             return Err(Reject::Busy);
         }
         orders.send(Order::Start { table: slot.give().ok_or(Reject::NotReady)?, tick });
+        (self.committed, self.before) = (number.wrapping_add(1), self.committed);
         Ok(())
     }
 
@@ -255,6 +351,9 @@ impl<'a> Intake<'a> {
 
     fn take_back(&mut self, table: Loaded<'a>, kept: bool) {
         let number = table.number();
+        if kept && self.committed == number.wrapping_add(1) {
+            self.committed = self.before;
+        }
         let slot = self.slots.iter_mut().find(|slot| slot.is_away() && slot.number() == Some(number));
         // The motion gives back what it was given.
         if let Some(slot) = slot {
@@ -269,11 +368,6 @@ impl<'a> Intake<'a> {
         }
         // There is room now.
         let _ = self.answers.push_back(message);
-    }
-
-    /// Forgets tables that were not handed over.
-    fn forget(&mut self) {
-        self.slots.iter_mut().for_each(Slot::clear);
     }
 
     fn slot(&mut self, table: u32) -> Option<&mut Slot<'a>> {

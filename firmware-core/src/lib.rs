@@ -9,10 +9,12 @@
 //!
 //! A drive has two halves. [`intake`] talks: messages in, tables checked, answers out. [`motion`] moves: one set-point per
 //! control tick. They share no memory and hand each other [`orders`], so that the tick never waits. [`player`] is both on the
-//! level of messages; [`drive`] puts them behind CAN frames; [`halves`] is what a board runs.
+//! level of messages; [`drive`] puts them behind CAN frames; [`halves`] is what a board runs. Between frames and [`intake`] stands
+//! the [`session`]: it knows which epoch is open, watches over host and drives, and keeps the [`clock`].
 #![no_std]
 
 pub mod axis;
+pub mod clock;
 mod course;
 pub mod double_s;
 pub mod drive;
@@ -24,9 +26,11 @@ pub mod intake;
 mod math;
 pub mod motion;
 pub mod orders;
+mod peers;
 pub mod player;
 pub mod proof;
 mod rate;
+pub mod session;
 mod store;
 pub mod table;
 mod telemetry;

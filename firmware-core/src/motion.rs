@@ -148,6 +148,22 @@ impl<'a> Motion<'a> {
     pub fn take_orders(&mut self, link: &mut impl Link<'a>) {
         while let Some(order) = link.next_order() {
             self.silence = 0;
+            match order {
+                Order::Clear => {
+                    link.report(Report::Cleared(self.clear()));
+                    continue;
+                }
+                Order::Shift { ticks } => {
+                    link.report(Report::Shifted { ticks: if self.shift(ticks) { ticks } else { 0 } });
+                    continue;
+                }
+                Order::Report => {
+                    let status = self.status();
+                    link.report(Report::Reported(status));
+                    continue;
+                }
+                _ => {}
+            }
             let (table, result, plans) = self.obey(order);
             if let Err(reason) = result {
                 // Nobody listens if there is no room: the host asks again.
@@ -184,6 +200,11 @@ impl<'a> Motion<'a> {
     /// The board has found a fault.
     pub fn trip(&mut self, code: u16) {
         self.fail(Fault::Board { code });
+    }
+
+    /// Number of the tick that comes next.
+    pub fn now(&self) -> u64 {
+        self.tick
     }
 
     /// The power state: what the power stage has to do.

@@ -9,7 +9,7 @@ use protocol::power::PowerEvent;
 use crate::store::Loaded;
 
 /// Orders that may wait for the next tick.
-pub const ORDERS: usize = 4;
+pub const ORDERS: usize = 6;
 /// Reports that may wait to be sent; status is dropped first.
 pub const REPORTS: usize = 6;
 
@@ -55,6 +55,20 @@ pub enum Order<'a> {
     },
     /// The host was heard.
     Alive,
+    /// A stop on the path.
+    Hold {
+        /// From this tick on, or at once if it has passed.
+        tick: u64,
+    },
+    /// At rest everything is forgotten, so that a new epoch may begin; answered by [`Report::Cleared`].
+    Clear,
+    /// The tick count jumps, at rest; answered by [`Report::Shifted`].
+    Shift {
+        /// By so many ticks.
+        ticks: i64,
+    },
+    /// A status is wanted now.
+    Report,
 }
 
 /// From motion to communication.
@@ -76,6 +90,15 @@ pub enum Report<'a> {
     },
     /// How the axis is.
     Status(Status),
+    /// A status that was asked for.
+    Reported(Status),
     /// How well it follows.
     Telemetry(Telemetry),
+    /// Whether the axis was at rest, and has forgotten everything.
+    Cleared(bool),
+    /// The tick count has jumped.
+    Shifted {
+        /// By so many ticks; 0 if the axis was not at rest.
+        ticks: i64,
+    },
 }

@@ -18,10 +18,17 @@ pub struct Player<'a> {
 }
 
 /// What is on its way between the halves.
-#[derive(Debug)]
-struct Queues<'a> {
+#[derive(Debug, Default)]
+pub(crate) struct Queues<'a> {
     orders: Deque<Order<'a>, ORDERS>,
     reports: Deque<Report<'a>, REPORTS>,
+}
+
+impl<'a> Queues<'a> {
+    /// The oldest report.
+    pub(crate) fn poll_report(&mut self) -> Option<Report<'a>> {
+        self.reports.pop_front()
+    }
 }
 
 impl<'a> Orders<'a> for Queues<'a> {
@@ -55,8 +62,7 @@ impl<'a> Link<'a> for Queues<'a> {
 impl<'a> Player<'a> {
     /// An axis at rest and without torque, with two buffers for tables.
     pub fn new(config: AxisConfig, a: &'a mut [u8], b: &'a mut [u8]) -> Self {
-        let queues = Queues { orders: Deque::new(), reports: Deque::new() };
-        Self { intake: Intake::new(config, a, b), motion: Motion::new(config), queues }
+        Self { intake: Intake::new(config, a, b), motion: Motion::new(config), queues: Queues::default() }
     }
 
     /// Takes a message; answers wait in [`Player::poll_answer`].
@@ -106,7 +112,7 @@ impl<'a> Player<'a> {
     }
 
     fn exchange(&mut self) {
-        while let Some(report) = self.queues.reports.pop_front() {
+        while let Some(report) = self.queues.poll_report() {
             self.intake.hear(report);
         }
     }

@@ -1,6 +1,9 @@
-//! Memory for one table, filled in order and checked when it is complete.
+//! Memory for one table, filled in any order and checked when it is complete.
+//!
+//! The streams lie at the beginning of the memory, and at its end one bit for each unit of them that has come.
 
-use protocol::message::{Part, Reject, part_crc};
+use protocol::bus::data::{self, PART_BYTES, UNIT};
+use protocol::message::{Gaps, Part, Reject, part_crc};
 use protocol::table::warp::RATE_ONE;
 use protocol::table::{AxisHeader, TableHeader};
 
@@ -37,9 +40,31 @@ struct Checked {
 /// How far a part has come.
 #[derive(Clone, Copy, Debug, Default)]
 struct Progress {
-    received: u32,
+    /// Units that have come.
+    units: u32,
     /// Its checksum, once sealed.
     seal: Option<u32>,
+}
+
+/// What came of a seal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sealed {
+    /// The other part is still to come.
+    Half,
+    /// The table is complete.
+    Whole,
+    /// These units are missing.
+    Missing(Gaps),
+}
+
+/// Units of a part.
+const fn units(bytes: usize) -> usize {
+    bytes.div_ceil(UNIT)
+}
+
+/// Bytes that hold a bit for each unit of a part.
+const fn map_bytes(bytes: usize) -> usize {
+    units(bytes).div_ceil(8)
 }
 
 /// A checked table with its memory: what communication and motion hand to each other.
@@ -103,9 +128,10 @@ impl<'a> Slot<'a> {
         Self { room: memory.len(), memory: Some(memory), table: None }
     }
 
-    /// Bytes there are for a table.
+    /// Bytes there are for a table, whatever its parts.
     pub(crate) fn room(&self) -> usize {
-        self.room
+        // A byte in forty is for the bits, and each part may round up by one.
+        (self.room.saturating_sub(2) / (8 * UNIT + 1)).saturating_mul(8 * UNIT)
     }
 
     /// Number of the table in it, or of the one that the motion has.
@@ -116,6 +142,11 @@ impl<'a> Slot<'a> {
     /// The table was checked and may be played.
     pub(crate) fn is_ready(&self) -> bool {
         self.memory.is_some() && self.table.is_some_and(|t| t.checked.is_some())
+    }
+
+    /// Bytes with this tag belong to it.
+    pub(crate) fn has_tag(&self, tag: u8) -> bool {
+        self.memory.is_some() && self.number().is_some_and(|number| data::tag(number) == tag)
     }
 
     /// The motion has the table.
@@ -150,55 +181,82 @@ impl<'a> Slot<'a> {
 
     pub(crate) fn open(&mut self, header: TableHeader) -> Result<(), Reject> {
         header.check().map_err(Reject::Table)?;
-        self.fits(header.shared_bytes())?;
+        self.fits(header.shared_bytes(), 0)?;
         let (shared, controls) = (Progress::default(), Progress::default());
         self.table = Some(Table { header, axis: None, shared, controls, checked: None });
+        self.clear_map(Part::Shared);
         Ok(())
     }
 
     pub(crate) fn open_axis(&mut self, axis: AxisHeader) -> Result<(), Reject> {
         let table = self.table.ok_or(Reject::NotOpen)?;
-        axis.check().map_err(Reject::Table)?;
-        self.fits(table.header.shared_bytes() + u64::from(axis.control_bytes))?;
-        self.table = Some(Table { axis: Some(axis), controls: Progress::default(), checked: None, ..table });
-        Ok(())
-    }
-
-    fn fits(&self, needed: u64) -> Result<(), Reject> {
-        let available = self.memory.as_ref().map_or(0, |memory| memory.len()) as u64;
-        if needed > available { Err(Reject::NoRoom { needed, available }) } else { Ok(()) }
-    }
-
-    /// Takes bytes that continue what came before; earlier ones came twice and are ignored, later ones leave a
-    /// gap that the seal reports.
-    pub(crate) fn data(&mut self, part: Part, offset: u32, bytes: &[u8]) -> Result<(), Reject> {
-        let Some(table) = &mut self.table else { return Err(Reject::NotOpen) };
-        let (from, length) = table.place(part).ok_or(Reject::NotOpen)?;
-        let progress = table.progress(part);
-        if progress.seal.is_some() || offset != progress.received {
+        if table.axis == Some(axis) {
             return Ok(());
         }
-        let after = offset as usize + bytes.len();
-        if after > length {
-            return Err(Reject::Incomplete { part, received: offset });
-        }
-        let memory = self.memory.as_mut().ok_or(Reject::NotOpen)?;
-        let target = memory.get_mut(from + offset as usize..from + after);
-        target.ok_or(Reject::NotOpen)?.copy_from_slice(bytes);
-        progress.received = after as u32;
+        axis.check().map_err(Reject::Table)?;
+        self.fits(table.header.shared_bytes(), u64::from(axis.control_bytes))?;
+        self.table = Some(Table { axis: Some(axis), controls: Progress::default(), checked: None, ..table });
+        self.clear_map(Part::Axis);
         Ok(())
     }
 
-    /// Ends a part; `Ok(true)` when the table has become complete.
-    pub(crate) fn seal(&mut self, part: Part, crc: u32) -> Result<bool, Reject> {
+    /// The table that is coming in has this header: it was opened before.
+    pub(crate) fn is_opened_by(&self, header: &TableHeader) -> bool {
+        self.memory.is_some() && self.table.is_some_and(|table| table.header == *header)
+    }
+
+    fn fits(&self, shared: u64, controls: u64) -> Result<(), Reject> {
+        let most = PART_BYTES as u64;
+        let available = self.memory.as_ref().map_or(0, |memory| memory.len()) as u64;
+        let map = |bytes: u64| map_bytes(bytes.min(most) as usize) as u64;
+        let needed =
+            shared.saturating_add(controls).saturating_add(map(shared)).saturating_add(map(controls));
+        let fits = needed <= available && shared <= most && controls <= most;
+        if fits { Ok(()) } else { Err(Reject::NoRoom { needed, available }) }
+    }
+
+    /// Takes bytes from a unit on; those that have come before are taken again, those behind the end are ignored.
+    pub(crate) fn data(&mut self, part: Part, unit: u32, bytes: &[u8]) -> Result<(), Reject> {
+        let Some(table) = &mut self.table else { return Err(Reject::NotOpen) };
+        let (from, length) = table.place(part).ok_or(Reject::NotOpen)?;
+        let map = table.map(part).ok_or(Reject::NotOpen)?;
+        let progress = table.progress(part);
+        let Some(left) = (unit as usize).checked_mul(UNIT).and_then(|at| length.checked_sub(at)) else {
+            return Ok(());
+        };
+        if progress.seal.is_some() {
+            return Ok(());
+        }
+        // Only the last unit of a part may be shorter than the others.
+        let count = if bytes.len() < left { bytes.len() / UNIT * UNIT } else { left };
+        let at = from + length - left;
+        let memory = self.memory.as_mut().ok_or(Reject::NotOpen)?;
+        let (Some(bytes), Some(to)) = (bytes.get(..count), memory.get_mut(at..at + count)) else {
+            return Err(Reject::NotOpen);
+        };
+        to.copy_from_slice(bytes);
+        let room = memory.len();
+        for unit in unit..unit + units(count) as u32 {
+            let place = room.checked_sub(map).and_then(|map| memory.get_mut(map + unit as usize / 8));
+            let Some(byte) = place else { return Err(Reject::NotOpen) };
+            let bit = 1 << (unit % 8);
+            progress.units += u32::from(*byte & bit == 0);
+            *byte |= bit;
+        }
+        Ok(())
+    }
+
+    /// Ends a part.
+    pub(crate) fn seal(&mut self, part: Part, crc: u32) -> Result<Sealed, Reject> {
         let Some(table) = &mut self.table else { return Err(Reject::NotOpen) };
         let (from, length) = table.place(part).ok_or(Reject::NotOpen)?;
         let progress = *table.progress(part);
+        let whole = |table: &Table| if table.is_complete() { Sealed::Whole } else { Sealed::Half };
         if progress.seal == Some(crc) {
-            return Ok(table.is_complete());
+            return Ok(whole(table));
         }
-        if (progress.received as usize) < length {
-            return Err(Reject::Incomplete { part, received: progress.received });
+        if (progress.units as usize) < units(length) {
+            return Ok(Sealed::Missing(self.gaps(part)));
         }
         let memory = self.memory.as_ref().ok_or(Reject::NotOpen)?;
         let bytes = memory.get(from..from + length).ok_or(Reject::NotOpen)?;
@@ -209,10 +267,42 @@ impl<'a> Slot<'a> {
         };
         if found != Ok(crc) {
             *table.progress(part) = Progress::default();
+            self.clear_map(part);
             return Err(Reject::Checksum(part));
         }
         table.progress(part).seal = Some(crc);
-        Ok(table.is_complete())
+        Ok(whole(table))
+    }
+
+    /// What has not come of a part.
+    fn gaps(&self, part: Part) -> Gaps {
+        let mut gaps = Gaps::default();
+        let (Some(table), Some(memory)) = (&self.table, &self.memory) else { return gaps };
+        let (Some((_, length)), Some(map)) = (table.place(part), table.map(part)) else { return gaps };
+        let bits = memory.len().checked_sub(map).and_then(|from| memory.get(from..)).unwrap_or(&[]);
+        let has = |unit: usize| bits.get(unit / 8).is_some_and(|byte| byte >> (unit % 8) & 1 != 0);
+        let mut unit = 0;
+        for gap in &mut gaps.0 {
+            let run = |unit: &mut usize, arrived: bool| {
+                let from = *unit;
+                while *unit < units(length) && has(*unit) == arrived {
+                    *unit += 1;
+                }
+                (*unit - from) as u32
+            };
+            *gap = (run(&mut unit, true), run(&mut unit, false));
+        }
+        gaps
+    }
+
+    fn clear_map(&mut self, part: Part) {
+        let Some(table) = &self.table else { return };
+        let (Some((_, length)), Some(map)) = (table.place(part), table.map(part)) else { return };
+        let Some(memory) = &mut self.memory else { return };
+        let from = memory.len().saturating_sub(map);
+        if let Some(bits) = memory.get_mut(from..from + map_bytes(length)) {
+            bits.fill(0);
+        }
     }
 
     /// Checks a complete table, and proves that it keeps its limits and stays within `travel`; its duration [2^-32 s].
@@ -272,6 +362,15 @@ impl Table {
         match part {
             Part::Shared => Some((0, shared)),
             Part::Axis => Some((shared, self.axis?.control_bytes as usize)),
+        }
+    }
+
+    /// How far from the end of the memory the bits of a part begin.
+    fn map(&self, part: Part) -> Option<usize> {
+        let shared = map_bytes(self.header.shared_bytes() as usize);
+        match part {
+            Part::Shared => Some(shared),
+            Part::Axis => Some(shared + map_bytes(self.axis?.control_bytes as usize)),
         }
     }
 

@@ -55,6 +55,9 @@ pub trait Bus {
     /// The oldest frame that has reached `node` and has not been taken yet.
     fn receive(&mut self, node: NodeIndex) -> Option<Received>;
 
+    /// The last frame of `node` that has crossed, once: what a controller's transmit event tells.
+    fn sent(&mut self, node: NodeIndex) -> Option<Received>;
+
     /// Frames of `node` still waiting to be sent.
     fn waiting(&self, node: NodeIndex) -> usize;
 

@@ -14,23 +14,31 @@ pub type Buffers = [Vec<u8>; 2];
 pub struct DriveNode<'m> {
     drive: Drive<'m>,
     node: NodeIndex,
+    /// When the present tick began.
+    began: Nanoseconds,
 }
 
 impl<'m> DriveNode<'m> {
     /// A drive at rest with its two table buffers.
     pub fn new(config: DriveConfig, buffers: &'m mut Buffers, bus: &mut dyn Bus) -> Self {
         let [a, b] = buffers;
-        Self { drive: Drive::new(config, a, b), node: bus.attach() }
+        Self { drive: Drive::new(config, a, b), node: bus.attach(), began: 0 }
     }
 
     /// One control tick at `now`: takes what has come, gives the set-point, sends what there is to say.
     ///
     /// The second value is whether the drive stands still.
     pub fn tick(&mut self, bus: &mut dyn Bus, now: Nanoseconds) -> (CountSetpoint, bool) {
+        let began = self.began;
+        let since = |time: Nanoseconds| u32::try_from(time.saturating_sub(began)).unwrap_or(u32::MAX);
+        if let Some(sent) = bus.sent(self.node) {
+            self.drive.sent(&sent.frame, since(sent.time));
+        }
         while let Some(received) = bus.receive(self.node) {
-            self.drive.receive(&received.frame);
+            self.drive.receive(&received.frame, since(received.time));
         }
         let s = self.drive.tick();
+        self.began = now;
         while let Some(frame) = self.drive.poll_transmit() {
             bus.send(self.node, frame, now);
         }
@@ -42,5 +50,10 @@ impl<'m> DriveNode<'m> {
     /// How the drive is.
     pub fn status(&self) -> Status {
         self.drive.status()
+    }
+
+    /// The drive itself.
+    pub fn drive(&self) -> &Drive<'m> {
+        &self.drive
     }
 }

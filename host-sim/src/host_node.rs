@@ -1,23 +1,33 @@
-//! The host on the bus: sends tables, waits until every drive is ready, starts all of them at one named tick.
+//! The host on the bus: opens an epoch with every drive, sends tables, waits until every drive is ready, starts all of them at
+//! one named tick.
 //!
 //! Drives hold two tables: while one plays the next is sent, checked and armed, so motion waits for the bus only
-//! when a table is shorter than the sending of the next one. A start is repeated until the status of every drive
-//! shows that it will play to the same tick; if one does not say so in time, the start is called off for all.
+//! when a table is shorter than the sending of the next one. A start is repeated until the beat of every drive
+//! confirms it; if one does not in time, the start is called off for all, with the epoch. A piece that takes over from the one
+//! before it is committed when all drives are ready for it.
 
+mod command;
+mod greeting;
+mod link;
 mod upload;
 
 use std::collections::VecDeque;
 
 use planner::feed::pack::Packed;
-use protocol::bus::{BLOCK_BYTES, FrameSize, Node, Reassembler, Segments, ids};
-use protocol::message::{DriveMessage, Fault, HostMessage, MessageBuffer, Reject, Status, decode, encode};
+use protocol::bus::stop::Stop;
+use protocol::bus::{FrameSize, Node};
+use protocol::message::{DriveMessage, Fault, Reject, Status};
 use protocol::power::{Power, PowerEvent};
 
 use crate::bus::{Bus, Nanoseconds, NodeIndex};
-use upload::{Block, Upload};
+use command::{Change, Command};
+use greeting::Greeting;
+pub use greeting::Mismatch;
+use link::{Heard, Link};
+use upload::Upload;
 
-/// Frames the host keeps in its interface's queue: two blocks, so that the wire never waits for the host.
-const QUEUED_FRAMES: usize = 96;
+/// Frames the host keeps in its interface's queue, so that the wire never waits for the host.
+const QUEUED_FRAMES: usize = 48;
 /// How often a stop is sent: it has no acknowledgement.
 const STOP_COPIES: usize = 3;
 /// Rounds without progress after which a drive counts as silent.
@@ -45,6 +55,8 @@ pub struct HostTiming {
     pub answer: u64,
     /// How long before a start that not all have confirmed it is called off.
     pub guard: u64,
+    /// Between two signs of life.
+    pub alive: u64,
 }
 
 /// A table with its agreed start.
@@ -59,7 +71,7 @@ pub struct Run {
 }
 
 /// Why the host gives up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum HostError {
     /// A drive refuses a table for good.
     #[error("axis {axis} refuses table {table}: {reason:?}")]
@@ -72,12 +84,10 @@ pub enum HostError {
         reason: Reject,
     },
     /// A drive does not answer, or never completely.
-    #[error("axis {axis} does not answer for table {table}")]
+    #[error("axis {axis} does not answer")]
     Silent {
         /// Which axis.
         axis: usize,
-        /// Which table.
-        table: u32,
     },
     /// A drive has given up.
     #[error("axis {axis} is in fault: {fault:?}")]
@@ -95,12 +105,26 @@ pub enum HostError {
         /// Which table.
         table: u32,
     },
+    /// A drive is not what the job needs.
+    #[error("axis {axis} does not fit: {mismatch}")]
+    Mismatch {
+        /// Which axis.
+        axis: usize,
+        /// In what.
+        mismatch: Mismatch,
+    },
+    /// The drives have stopped on their path.
+    #[error("axis {axis} has ended its epoch: the drives stop on their path")]
+    Stopped {
+        /// Which axis was seen first.
+        axis: usize,
+    },
 }
 
 /// What the host has gone through.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HostCounters {
-    /// Blocks that were sent again.
+    /// Data frames and messages that were sent again.
     pub resent_blocks: u64,
     /// Starts that were called off.
     pub aborted_starts: u64,
@@ -114,6 +138,7 @@ pub struct HostNode<'a> {
     timing: HostTiming,
     orders: &'a [Order],
     drives: Vec<Link>,
+    greeting: Greeting,
     next: usize,
     phase: Phase<'a>,
     outbox: VecDeque<Command>,
@@ -121,27 +146,11 @@ pub struct HostNode<'a> {
     lead_growth: u32,
     /// When drives without torque are told again to enable operation.
     enable_at: u64,
+    alive_at: u64,
+    change: Option<Change>,
+    changes: u8,
+    stopped: bool,
     counters: HostCounters,
-}
-
-/// What the host knows of one drive.
-#[derive(Debug)]
-struct Link {
-    address: Node,
-    incoming: Reassembler<BLOCK_BYTES>,
-    status: Option<Status>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Command {
-    Send(Block),
-    Start {
-        table: u32,
-        tick: u64,
-    },
-    Stop,
-    /// To one drive, by its index.
-    Power(usize, PowerEvent),
 }
 
 #[derive(Debug)]
@@ -163,19 +172,23 @@ impl<'a> HostNode<'a> {
         timing: HostTiming,
         bus: &mut dyn Bus,
     ) -> Self {
-        let link = |address| Link { address, incoming: Reassembler::new(), status: None };
         Self {
             node: bus.attach(),
             frames,
             timing,
             orders,
-            drives: (1..=axes).filter_map(Node::new).map(link).collect(),
+            drives: (1..=axes).filter_map(Node::new).map(Link::new).collect(),
+            greeting: Greeting::default(),
             next: 0,
             phase: Phase::Idle,
             outbox: VecDeque::new(),
             runs: VecDeque::new(),
             lead_growth: 0,
             enable_at: 0,
+            alive_at: 0,
+            change: None,
+            changes: 0,
+            stopped: false,
             counters: HostCounters::default(),
         }
     }
@@ -204,9 +217,13 @@ impl<'a> HostNode<'a> {
 
     /// Whether all tables have been played at `tick`.
     pub fn is_finished(&self, tick: u64) -> bool {
-        self.next == self.orders.len()
-            && matches!(self.phase, Phase::Idle)
-            && self.runs.back().is_none_or(|r| tick > r.start + r.ticks)
+        let joined = self.orders.last().is_some_and(|order| order.packed.header.joint.is_some());
+        let played = if joined {
+            self.drives.iter().all(Link::has_come_to_rest)
+        } else {
+            self.runs.back().is_none_or(|r| tick > r.start + r.ticks)
+        };
+        self.next == self.orders.len() && matches!(self.phase, Phase::Idle) && played
     }
 
     /// What the host has gone through.
@@ -214,19 +231,65 @@ impl<'a> HostNode<'a> {
         self.counters
     }
 
+    /// How many orders all drives have confirmed.
+    pub fn confirmed(&self) -> usize {
+        self.next
+    }
+
+    /// What every drive has told last, in the order of the axes.
+    pub fn drives(&self) -> impl Iterator<Item = &Link> {
+        self.drives.iter()
+    }
+
+    /// Path time goes at another rate [0.1 %] as soon as all drives have confirmed it; what has not been confirmed by its tick
+    /// becomes a stop on the path.
+    pub fn change_rate(&mut self, permille: u16, tick: u64) {
+        self.changes = if self.changes == u8::MAX { 1 } else { self.changes + 1 };
+        let tick = tick + self.timing.lead.max(2 * self.timing.guard);
+        self.change = Some(Change { permille, tick, number: self.changes, repeat_at: 0 });
+    }
+
+    /// Stops all drives; the epoch ends.
+    pub fn stop(&mut self, stop: Stop) {
+        self.outbox.clear();
+        self.outbox.extend([Command::Stop(stop); STOP_COPIES]);
+        self.phase = Phase::Idle;
+        self.next = self.orders.len();
+        self.stopped = true;
+    }
+
     fn listen(&mut self, id: u16, data: &[u8]) -> Result<(), HostError> {
-        let number = Node::of_answer(id).map(Node::number).unwrap_or_default();
-        let Some(axis) = usize::from(number).checked_sub(1) else { return Ok(()) };
-        let Some(link) = self.drives.get_mut(axis) else { return Ok(()) };
-        // A message with a lost frame is as good as none: silence is what the host acts on.
-        let Ok(Some(bytes)) = link.incoming.push(data) else { return Ok(()) };
-        let Ok(message) = decode::<DriveMessage>(bytes) else { return Ok(()) };
-        if let DriveMessage::Status(status) = message {
-            link.status = Some(status);
-            return match status.fault {
-                Some(fault) => Err(HostError::Faulted { axis, fault }),
-                None => Ok(()),
-            };
+        let epoch = self.greeting.epoch();
+        let heard = self
+            .drives
+            .iter_mut()
+            .enumerate()
+            .find_map(|(axis, link)| link.listen(id, data).map(|heard| (axis, heard)));
+        let Some((axis, heard)) = heard else { return Ok(()) };
+        let message = match heard {
+            Heard::Beat(beat) => {
+                let closed = self.greeting.is_open() && beat.epoch == epoch as u8 && !beat.open;
+                return if closed { self.closed(axis) } else { Ok(()) };
+            }
+            Heard::Boot => return if self.greeting.is_open() { self.closed(axis) } else { Ok(()) },
+            Heard::Message(message) => message,
+        };
+        match message {
+            DriveMessage::Status(Status { fault: Some(fault), .. }) => {
+                return Err(HostError::Faulted { axis, fault });
+            }
+            DriveMessage::Status(_) | DriveMessage::Telemetry(_) | DriveMessage::Identity(_) => return Ok(()),
+            DriveMessage::Begun { epoch } => {
+                self.greeting.begun(axis, epoch);
+                return Ok(());
+            }
+            DriveMessage::Reject { reason, .. } if !self.greeting.is_open() => {
+                self.greeting.refused(&mut self.drives[axis], reason);
+                return Ok(());
+            }
+            // What was sent before the epoch was open, or after it.
+            DriveMessage::Reject { reason: Reject::Epoch { .. }, .. } => return Ok(()),
+            _ => {}
         }
         match &mut self.phase {
             Phase::Idle => Ok(()),
@@ -236,7 +299,47 @@ impl<'a> HostNode<'a> {
         }
     }
 
+    /// A drive has closed the epoch: what has not begun to move is begun anew, what moves stops.
+    fn closed(&mut self, axis: usize) -> Result<(), HostError> {
+        if self.stopped {
+            return Ok(());
+        }
+        if !self.runs.is_empty() {
+            return Err(HostError::Stopped { axis });
+        }
+        self.begin_anew();
+        Ok(())
+    }
+
+    fn begin_anew(&mut self) {
+        self.outbox.clear();
+        self.greeting.close();
+        self.change = None;
+        if let Phase::Uploading(upload) | Phase::Starting { upload, .. } = &mut self.phase {
+            upload.begin_anew();
+        }
+        if let Phase::Starting { upload, .. } = core::mem::replace(&mut self.phase, Phase::Idle) {
+            self.phase = Phase::Uploading(upload);
+        }
+    }
+
     fn decide(&mut self, tick: u64, sent: bool) -> Result<(), HostError> {
+        if self.stopped {
+            return Ok(());
+        }
+        if !self.greeting.is_open() {
+            if sent {
+                let needs = self.orders.first().map(|order| &order.packed);
+                let commands = self.greeting.proceed(&mut self.drives, needs, tick, self.timing.answer)?;
+                self.outbox.extend(commands);
+            }
+            return Ok(());
+        }
+        if tick >= self.alive_at {
+            self.alive_at = tick + self.timing.alive;
+            self.outbox.push_front(Command::Alive);
+        }
+        self.pursue_change(tick);
         if self.runs.is_empty() {
             self.enable(tick);
         }
@@ -248,6 +351,26 @@ impl<'a> HostNode<'a> {
         Ok(())
     }
 
+    /// Repeats a change of rate until all have confirmed it; what they have not in time becomes a stop.
+    fn pursue_change(&mut self, tick: u64) {
+        let Some(mut change) = self.change else { return };
+        let confirmed = |link: &Link| link.beat().is_some_and(|beat| beat.change == change.number);
+        if self.drives.iter().all(confirmed) {
+            self.change = None;
+            return;
+        }
+        if tick + self.timing.guard >= change.tick {
+            self.stop(Stop::Path { tick: Some(change.tick as u32) });
+            self.change = None;
+            return;
+        }
+        if tick >= change.repeat_at {
+            change.repeat_at = tick + (self.timing.lead / 4).max(1);
+            self.outbox.push_front(Command::Rate(change));
+            self.change = Some(change);
+        }
+    }
+
     /// Leads drives that do not follow set-points yet through their power states.
     fn enable(&mut self, tick: u64) {
         if tick < self.enable_at {
@@ -255,18 +378,26 @@ impl<'a> HostNode<'a> {
         }
         self.enable_at = tick + self.timing.answer;
         for (index, link) in self.drives.iter().enumerate() {
-            let commands: &[PowerEvent] = match link.status.map(|s| s.power) {
+            let commands: &[PowerEvent] = match link.beat().map(|beat| beat.power) {
                 None | Some(Power::SwitchOnDisabled) => &[PowerEvent::Shutdown, PowerEvent::EnableOperation],
-                Some(Power::ReadyToSwitchOn | Power::SwitchedOn) => &[PowerEvent::EnableOperation],
+                Some(Power::ReadyToSwitchOn | Power::SwitchedOn | Power::QuickStopActive) => {
+                    &[PowerEvent::EnableOperation]
+                }
+                Some(Power::Fault) => &[PowerEvent::ResetFault],
                 Some(_) => &[],
             };
             self.outbox.extend(commands.iter().map(|&event| Command::Power(index, event)));
         }
     }
 
+    /// All drives follow set-points, in step with each other.
     fn all_enabled(&self) -> bool {
-        let enabled = |s: Status| s.power == Power::OperationEnabled;
-        self.drives.iter().all(|link| link.status.is_some_and(enabled))
+        let epoch = self.greeting.epoch() as u8;
+        self.drives.iter().all(|link| {
+            link.beat().is_some_and(|beat| {
+                beat.power == Power::OperationEnabled && beat.synced && beat.open && beat.epoch == epoch
+            })
+        })
     }
 
     /// Takes up the next order once the drives have a buffer free: when the table before it plays.
@@ -274,14 +405,16 @@ impl<'a> HostNode<'a> {
         while self.runs.len() > 1 && self.runs[0].start + self.runs[0].ticks < tick {
             self.runs.pop_front();
         }
-        match self.orders.get(self.next) {
-            Some(order) if self.runs.back().is_none_or(|r| tick > r.start) => {
-                let upload = Upload::new(&order.packed, self.drives.len());
-                self.outbox.extend(upload.everything().map(Command::Send));
-                Phase::Uploading(upload)
-            }
-            _ => Phase::Idle,
+        let Some(order) = self.orders.get(self.next) else { return Phase::Idle };
+        let joins = order.packed.header.joint.is_some();
+        let free = || self.drives.iter().all(|link| link.beat().is_some_and(|beat| beat.free > 0));
+        let ready = if joins { free() } else { self.runs.back().is_none_or(|r| tick > r.start) };
+        if !ready {
+            return Phase::Idle;
         }
+        let upload = Upload::new(&order.packed, self.drives.len(), self.frames);
+        self.outbox.extend(upload.everything().map(Command::Send));
+        Phase::Uploading(upload)
     }
 
     fn upload(&mut self, mut upload: Upload<'a>, tick: u64, sent: bool) -> Result<Phase<'a>, HostError> {
@@ -316,52 +449,42 @@ impl<'a> HostNode<'a> {
         repeat_at: u64,
         tick: u64,
     ) -> Result<Phase<'a>, HostError> {
-        let will_play = |link: &Link| link.status.is_some_and(|s| s.tick + s.fill == run.start + run.ticks);
-        if self.drives.iter().all(will_play) {
-            self.runs.push_back(run);
+        let joins = self.orders[run.order].packed.header.joint.is_some();
+        let table = upload.table();
+        let confirmed =
+            |link: &Link| link.beat().is_some_and(|b| b.committed == (table as u8).wrapping_add(1));
+        if self.drives.iter().all(confirmed) {
+            if joins {
+                // How long the whole motion is, the drives know.
+                self.runs.truncate(1);
+            } else {
+                self.runs.push_back(run);
+            }
             self.next += 1;
             self.lead_growth = 0;
             return Ok(Phase::Idle);
         }
-        if upload.is_refused() || tick + self.timing.guard >= run.start {
-            // What was received is forgotten with the stop, so the table is sent anew.
+        if joins && upload.is_refused() {
+            // It has come too late: all drives go on to the end of what they hold.
+            let reason = Reject::Late { tick };
+            return Err(HostError::Rejected { axis: 0, table, reason });
+        }
+        if !joins && (upload.is_refused() || tick + self.timing.guard >= run.start) {
+            // Epoch and table are begun anew, so that no copy of this start is obeyed any more.
             self.counters.aborted_starts += 1;
             self.lead_growth = (self.lead_growth + 1).min(MAX_LEAD_GROWTH);
-            self.outbox.clear();
-            self.outbox.extend([Command::Stop; STOP_COPIES]);
-            upload.begin_anew();
-            self.again(&mut upload)?;
-            return Ok(Phase::Uploading(upload));
+            self.phase = Phase::Uploading(upload);
+            self.begin_anew();
+            self.outbox.extend([Command::Cancel; STOP_COPIES]);
+            return Ok(core::mem::replace(&mut self.phase, Phase::Idle));
         }
         if tick >= repeat_at {
-            self.outbox.push_back(Command::Start { table: upload.table(), tick: run.start });
+            upload.hear_no_evil();
+            self.outbox.push_back(Command::Start { table, tick: run.start });
             let repeat_at = tick + (self.timing.lead / 4).max(1);
             return Ok(Phase::Starting { upload, run, repeat_at });
         }
         Ok(Phase::Starting { upload, run, repeat_at })
-    }
-
-    fn send(&self, command: Command, bus: &mut dyn Bus, now: Nanoseconds) {
-        let (id, message) = match command {
-            Command::Send(block) => {
-                let (Phase::Uploading(upload) | Phase::Starting { upload, .. }) = &self.phase else { return };
-                let (axis, message) = upload.message(block);
-                let to = axis.and_then(|axis| self.drives.get(axis));
-                (to.map_or(ids::BROADCAST, |link| link.address.to_drive()), message)
-            }
-            Command::Start { table, tick } => (ids::BROADCAST, HostMessage::Start { table, tick }),
-            Command::Stop => (ids::STOP, HostMessage::Stop),
-            Command::Power(drive, event) => {
-                let Some(link) = self.drives.get(drive) else { return };
-                (link.address.to_drive(), HostMessage::Power(event))
-            }
-        };
-        let mut buffer: MessageBuffer = [0; _];
-        // Every message fits the buffer: data is cut to `DATA_BYTES`.
-        let Ok(bytes) = encode(&message, &mut buffer) else { return };
-        for frame in Segments::new(id, self.frames, bytes).into_iter().flatten() {
-            bus.send(self.node, frame, now);
-        }
     }
 }
 

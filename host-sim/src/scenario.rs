@@ -6,6 +6,7 @@ pub use settings::{Loss, Progress, SimError, SimSettings};
 
 use firmware_core::axis::{AxisConfig, Excess};
 use firmware_core::drive::DriveConfig;
+use firmware_core::session::Watch;
 use planner::feed::job::{JobItem, PlannedSection};
 use planner::feed::pack::{Target, limits_in_counts, pack};
 use planner::feed::table::FeedTable;
@@ -196,7 +197,7 @@ impl<'a> Programme<'a> {
             self.origin = packed.axes.iter().map(|axis| axis.header.start).collect();
         }
         let longest = packed.axes.iter().map(|axis| axis.controls.len()).max().unwrap_or(0);
-        self.buffer_bytes = self.buffer_bytes.max(packed.shared.len() + longest);
+        self.buffer_bytes = self.buffer_bytes.max(buffer_for(packed.shared.len() + longest));
         self.motion_s += section.table.duration();
         self.tables.push(&section.table);
         self.orders.push(Order { packed, pause: core::mem::take(&mut self.final_pause) });
@@ -225,6 +226,10 @@ impl<'a> Programme<'a> {
             node: address.ok_or(SimError::AxisCount { axes: self.machine.axes.len() })?,
             frames: settings.bus.format,
             // The planner keeps programs within the travel; paths may leave it by their tolerance.
+            watch: Watch {
+                boot: axis as u32 + 1,
+                ..Watch::new(self.tick_ns, settings.status_ticks(self.tick_s))
+            },
             axis: AxisConfig {
                 position: self.origin[axis],
                 excess: Excess { acceleration: rule.acceleration as f32, jerk: rule.jerk as f32 },
@@ -287,6 +292,11 @@ impl<'a> Programme<'a> {
             },
         }
     }
+}
+
+/// Bytes of a drive's buffer that holds a table of so many: a bit for each five of them comes to it.
+pub fn buffer_for(table: usize) -> usize {
+    table.div_ceil(40) * 41 + 2
 }
 
 /// The last control points of a table to whole counts, halves up, as the format has it.

@@ -115,7 +115,8 @@ impl SlcanLine {
         let end = Instant::now() + patience;
         let mut incoming = Reassembler::<BLOCK_BYTES>::new();
         while Instant::now() < end {
-            for frame in Segments::new(ids::BROADCAST, FrameSize::Classic, question).into_iter().flatten() {
+            for frame in Segments::new(ids::BROADCAST, FrameSize::Classic, 0, question).into_iter().flatten()
+            {
                 self.send(&frame)?;
             }
             let again = (Instant::now() + AGAIN).min(end);
@@ -123,7 +124,7 @@ impl SlcanLine {
                 if Node::of_answer(frame.id()) != Some(node) {
                     continue;
                 }
-                let Ok(Some(bytes)) = incoming.push(frame.data()) else { continue };
+                let Ok(Some((_, bytes))) = incoming.push(frame.data()) else { continue };
                 if let Ok(DriveMessage::Identity(identity)) = decode(bytes) {
                     return Ok(identity);
                 }
@@ -141,13 +142,14 @@ mod tests {
 
     use firmware_core::axis::AxisConfig;
     use firmware_core::drive::{Drive, DriveConfig};
+    use firmware_core::session::Watch;
     use protocol::table::Limits;
 
     /// The drive core behind one end of a line, as an image has it; garbage comes before its first answer.
     fn drive(node: Node, mut line: UnixStream) {
         let limits = Limits { velocity: 1e5, acceleration: 1e6, jerk: Some(1e8) };
         let axis = AxisConfig { status_ticks: 1, ..AxisConfig::new(node.number() - 1, 1_000_000, limits) };
-        let config = DriveConfig { node, frames: FrameSize::Classic, axis };
+        let config = DriveConfig { node, frames: FrameSize::Classic, axis, watch: Watch::new(1_000_000, 1) };
         let (mut a, mut b) = ([0; 512], [0; 1024]);
         let mut drive = Drive::new(config, &mut a, &mut b);
         let (mut reader, mut byte) = (Reader::new(), [0u8]);
@@ -155,7 +157,7 @@ mod tests {
         while let Ok(1) = line.read(&mut byte) {
             let Some(read) = reader.push(byte[0]) else { continue };
             if let Line::Frame(frame) = read {
-                drive.receive(&frame);
+                drive.receive(&frame, 0);
             }
             drive.tick();
             while let Some(frame) = drive.poll_transmit() {
@@ -173,7 +175,7 @@ mod tests {
     #[test]
     fn a_drive_says_who_it_is() {
         let identity = line_to(5).identify(Node::new(5).unwrap(), Duration::from_secs(20)).unwrap();
-        assert_eq!((identity.axis, identity.tick_ns, identity.room), (4, 1_000_000, 512));
+        assert_eq!((identity.axis, identity.tick_ns, identity.room), (4, 1_000_000, 480));
         assert_eq!(identity.schema, protocol::schema::HASH);
     }
 

@@ -8,8 +8,8 @@ use crate::bus::MESSAGE_BYTES;
 use crate::power::{Power, PowerEvent};
 use crate::table::{AxisHeader, AxisLimit, Limits, TableError, TableHeader};
 
-/// Most table bytes of one [`HostMessage::Data`]; with all its other fields it then fits a block.
-pub const DATA_BYTES: usize = 312;
+/// Longest message of a drive.
+pub const ANSWER_BYTES: usize = 80;
 
 /// Room for any header, as postcard.
 pub const HEADER_BYTES: usize = 128;
@@ -22,17 +22,6 @@ pub enum HostMessage<'a> {
     Open(TableHeader),
     /// The header of the axis part, to one drive, after [`HostMessage::Open`].
     OpenAxis(AxisHeader),
-    /// Bytes of the table. They come in order; repeated ones are ignored.
-    Data {
-        /// Which table.
-        table: u32,
-        /// Which part of it.
-        part: Part,
-        /// Where the bytes belong, from the start of the part.
-        offset: u32,
-        /// At most [`DATA_BYTES`].
-        bytes: &'a [u8],
-    },
     /// The part is complete; the drive checks it. When both parts are sealed it answers
     /// [`DriveMessage::Ready`] or [`DriveMessage::Reject`].
     Seal {
@@ -80,9 +69,33 @@ pub enum HostMessage<'a> {
         permille: u16,
         /// When [ticks].
         tick: u64,
+        /// Repeats have the same number, which beats confirm; with 0 every one counts.
+        number: u8,
     },
     /// The host is there: what drives that guard against a lost connection wait for.
     Alive,
+    /// Opens the epoch of the block that carries it, for one drive: nothing moves without one. It has to be newer than all that
+    /// the drive knows, and the drive at rest.
+    Begin {
+        /// What the drive has told of its last start-up: a host that does not know it was not meant for this one.
+        boot: u32,
+        /// Drives that move together: bit n - 1 for node n. The lowest one is the time master.
+        members: u128,
+    },
+    /// How is everything? Answered by [`DriveMessage::Status`] in any state.
+    Report,
+    /// Bytes of a table, in any order; repeated ones are harmless. They have frames of their own, see [`crate::bus::data`].
+    #[serde(skip)]
+    Data {
+        /// Lowest bits of the table's number.
+        tag: u8,
+        /// Which part of it.
+        part: Part,
+        /// First unit of the part.
+        unit: u32,
+        /// The bytes from there on.
+        bytes: &'a [u8],
+    },
 }
 
 /// A part of a table.
@@ -119,6 +132,38 @@ pub enum DriveMessage {
     Identity(Identity),
     /// How well it follows; after a status, from drives that know their position.
     Telemetry(Telemetry),
+    /// The answer to a seal that came too early: what has not arrived.
+    Missing {
+        /// Which table.
+        table: u32,
+        /// Which part of it.
+        part: Part,
+        /// The first gaps.
+        gaps: Gaps,
+    },
+    /// The epoch is open.
+    Begun {
+        /// The epoch.
+        epoch: u16,
+    },
+}
+
+/// Gaps that are told at once.
+pub const GAPS: usize = 8;
+
+/// What is missing of a part: units that have arrived, and units behind them that have not, in turn. A gap of none ends the list.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Gaps(pub [(u32, u32); GAPS]);
+
+impl Gaps {
+    /// The gaps as ranges of units; a list that makes no sense ends where it does so.
+    pub fn ranges(&self) -> impl Iterator<Item = core::ops::Range<u32>> + '_ {
+        self.0.iter().scan(0u32, |at, &(arrived, missing)| {
+            let from = at.checked_add(arrived)?;
+            *at = from.checked_add(missing)?;
+            (missing > 0).then_some(from..*at)
+        })
+    }
 }
 
 /// How an axis has followed since the telemetry before.
@@ -153,6 +198,10 @@ pub struct Identity {
     pub limits: Limits,
     /// Room for one table [bytes]; it holds two.
     pub room: u32,
+    /// Another number after every start-up.
+    pub boot: u32,
+    /// The newest epoch that it knows.
+    pub epoch: u16,
 }
 
 /// How a drive is.
@@ -223,13 +272,6 @@ pub enum Reject {
     Table(TableError),
     /// A part's checksum differs.
     Checksum(Part),
-    /// Bytes of a part are missing.
-    Incomplete {
-        /// Which part.
-        part: Part,
-        /// How many bytes came without a gap.
-        received: u32,
-    },
     /// The table does not fit the drive's memory.
     NoRoom {
         /// Bytes it needs.
@@ -282,6 +324,17 @@ pub enum Reject {
     Override,
     /// The table does not go on where the table is left that it names.
     Joint,
+    /// Not of the open epoch, or not newer than what the drive knows.
+    Epoch {
+        /// The newest one that it knows.
+        epoch: u16,
+    },
+    /// Meant for another start-up of the drive.
+    Boot,
+    /// The drive's clock does not agree with the time master's.
+    Clock,
+    /// The drive is not one of the members, or they are too many.
+    Members,
 }
 
 /// Why a message could not be written or read.

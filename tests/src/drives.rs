@@ -5,6 +5,7 @@ use firmware_core::evaluate::Cursor;
 use firmware_core::player::Player;
 use firmware_core::table::TableView;
 use planner::feed::pack::Packed;
+use protocol::bus::data;
 use protocol::message::{DriveMessage, HostMessage, Part};
 use protocol::power::PowerEvent;
 use protocol::table::Limits;
@@ -76,8 +77,9 @@ pub fn send(player: &mut Player<'_>, packed: &Packed, axis: usize) {
     for (kind, bytes, crc) in
         [(Part::Shared, &packed.shared, packed.shared_crc()), (Part::Axis, &part.controls, part.crc())]
     {
-        for (k, bytes) in bytes.chunks(300).enumerate() {
-            player.handle(&HostMessage::Data { table, part: kind, offset: 300 * k as u32, bytes });
+        for (k, bytes) in bytes.chunks(12 * data::UNIT).enumerate() {
+            let (tag, unit) = (data::tag(table), 12 * k as u32);
+            player.handle(&HostMessage::Data { tag, part: kind, unit, bytes });
         }
         player.handle(&HostMessage::Seal { table, part: kind, crc });
     }

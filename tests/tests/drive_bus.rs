@@ -4,6 +4,7 @@
 use firmware_core::axis::AxisConfig;
 use firmware_core::drive::{Drive, DriveConfig};
 use firmware_core::evaluate::{Cursor, Setpoint};
+use firmware_core::session::Watch;
 use firmware_core::table::TableView;
 use planner::feed::messages::frames;
 use planner::feed::pack::Packed;
@@ -18,16 +19,25 @@ const LIMITS: Limits = Limits { velocity: 1e9, acceleration: 1e12, jerk: None };
 
 fn config(axis: usize, position: i64) -> DriveConfig {
     let axis_config = AxisConfig { position, ..AxisConfig::new(axis as u8, TICK_NS, LIMITS) };
-    DriveConfig { node: node(axis), frames: FrameSize::Classic, axis: axis_config }
+    let watch = Watch { host_ticks: 0, ..Watch::new(TICK_NS, 0) };
+    DriveConfig { node: node(axis), frames: FrameSize::Classic, axis: axis_config, watch }
 }
 
 /// A drive under torque.
 fn enabled<'a>(config: DriveConfig, a: &'a mut [u8], b: &'a mut [u8]) -> Drive<'a> {
     let mut drive = Drive::new(config, a, b);
+    begin(&mut drive, config.node, 1);
     for event in [PowerEvent::Shutdown, PowerEvent::EnableOperation] {
         send(&mut drive, config.node.to_drive(), &HostMessage::Power(event));
     }
     drive
+}
+
+/// Opens an epoch with a drive at rest.
+fn begin(drive: &mut Drive<'_>, node: Node, epoch: u16) {
+    let message = HostMessage::Begin { boot: 0, members: 1 << (node.number() - 1) };
+    frames(node.to_drive(), FrameSize::Classic, epoch, &message).iter().for_each(|f| drive.receive(f, 0));
+    assert!(answers(drive).contains(&DriveMessage::Begun { epoch }));
 }
 
 fn node(axis: usize) -> Node {
@@ -35,21 +45,22 @@ fn node(axis: usize) -> Node {
 }
 
 fn send(drive: &mut Drive<'_>, id: u16, message: &HostMessage<'_>) {
-    frames(id, FrameSize::Classic, message).iter().for_each(|frame| drive.receive(frame));
+    frames(id, FrameSize::Classic, 1, message).iter().for_each(|frame| drive.receive(frame, 0));
 }
 
 /// All frames that bring axis `axis` its table.
 fn table_frames(packed: &Packed, axis: usize, size: FrameSize) -> Vec<Frame> {
-    let shared = packed.shared_messages().flat_map(|m| frames(ids::BROADCAST, size, &m));
-    let own = packed.axis_messages(axis).flat_map(|m| frames(node(axis).to_drive(), size, &m));
-    shared.chain(own).collect()
+    packed.frames(axis, node(axis), size, 1)
 }
 
 fn answers(drive: &mut Drive<'_>) -> Vec<DriveMessage> {
-    let mut receiver = Reassembler::<64>::new();
+    let mut receiver = Reassembler::<96>::new();
     let mut messages = Vec::new();
     while let Some(frame) = drive.poll_transmit() {
-        if let Some(bytes) = receiver.push(frame.data()).unwrap() {
+        if Node::of_answer(frame.id()).is_none() {
+            continue;
+        }
+        if let Some((_, bytes)) = receiver.push(frame.data()).unwrap() {
             messages.push(decode(bytes).unwrap());
         }
     }
@@ -110,7 +121,7 @@ fn axes_start_together_and_end_at_rest_on_the_exact_count() {
                 })
                 .collect();
             for (axis, drive) in drives.iter_mut().enumerate() {
-                table_frames(&packed, axis, size).iter().for_each(|frame| drive.receive(frame));
+                table_frames(&packed, axis, size).iter().for_each(|frame| drive.receive(frame, 0));
                 let ticks = expected[axis].len() as u64 - 1;
                 let crc = [packed.shared_crc(), packed.axes[axis].crc()];
                 assert_eq!(answers(drive), [DriveMessage::Ready { table: 1, ticks, crc }]);
@@ -152,7 +163,7 @@ fn the_next_table_comes_in_while_one_plays_and_follows_without_a_gap() {
     let expected = (evaluated(&packed, 0), evaluated(&back, 0));
     let (mut a, mut b) = ([0; 4096], [0; 4096]);
     let mut drive = enabled(config(0, start_of(&packed)), &mut a, &mut b);
-    table_frames(&packed, 0, FrameSize::Classic).iter().for_each(|frame| drive.receive(frame));
+    table_frames(&packed, 0, FrameSize::Classic).iter().for_each(|frame| drive.receive(frame, 0));
     send(&mut drive, ids::BROADCAST, &HostMessage::Start { table: 1, tick: 0 });
     assert!(is_ready(&mut drive, 1));
     let mut pending = table_frames(&back, 0, FrameSize::Classic).into_iter();
@@ -160,7 +171,7 @@ fn the_next_table_comes_in_while_one_plays_and_follows_without_a_gap() {
     let mut found = Vec::new();
     for tick in 0..end + expected.1.len() as u64 {
         found.push(drive.tick());
-        pending.by_ref().take(3).for_each(|frame| drive.receive(&frame));
+        pending.by_ref().take(3).for_each(|frame| drive.receive(&frame, 0));
         if pending.len() == 0 && tick + 1 < end {
             let early = HostMessage::Start { table: 2, tick: end - 1 };
             if drive.status().fill <= end {
@@ -187,12 +198,12 @@ fn one_lost_frame_anywhere_means_no_motion_until_it_is_sent_again() {
     for lost in 0..all.len() {
         let (mut a, mut b) = ([0; 4096], [0; 4096]);
         let mut drive = enabled(config(0, start_of(&packed)), &mut a, &mut b);
-        all.iter().enumerate().filter(|(i, _)| *i != lost).for_each(|(_, frame)| drive.receive(frame));
+        all.iter().enumerate().filter(|(i, _)| *i != lost).for_each(|(_, frame)| drive.receive(frame, 0));
         assert!(!is_ready(&mut drive, 1), "frame {lost}");
         send(&mut drive, ids::BROADCAST, &HostMessage::Start { table: 1, tick: 1 });
         assert!((0..50).all(|_| drive.tick() == Setpoint::at_rest(start_of(&packed))));
         answers(&mut drive);
-        all.iter().for_each(|frame| drive.receive(frame));
+        all.iter().for_each(|frame| drive.receive(frame, 0));
         assert!(is_ready(&mut drive, 1), "frame {lost}");
     }
 }
@@ -202,13 +213,9 @@ fn doubled_messages_change_nothing() {
     let (_, packed) = sample(34);
     let (mut a, mut b) = ([0; 4096], [0; 4096]);
     let mut drive = enabled(config(0, start_of(&packed)), &mut a, &mut b);
-    let mut messages: Vec<_> = packed.shared_messages().map(|m| (ids::BROADCAST, m)).collect();
-    messages.extend(packed.axis_messages(0).map(|m| (node(0).to_drive(), m)));
-    for (id, message) in &messages {
-        send(&mut drive, *id, message);
-        if !matches!(message, HostMessage::Open(_) | HostMessage::OpenAxis(_)) {
-            send(&mut drive, *id, message);
-        }
+    for frame in table_frames(&packed, 0, FrameSize::Classic) {
+        drive.receive(&frame, 0);
+        drive.receive(&frame, 0);
     }
     let answers = answers(&mut drive);
     assert!(!answers.is_empty());
@@ -222,7 +229,7 @@ fn tables_that_do_not_fit_are_refused_by_name() {
     let refuse = |config: DriveConfig, packed: &Packed, room: usize| {
         let (mut a, mut b) = (vec![0; room], vec![0; room]);
         let mut drive = enabled(config, &mut a, &mut b);
-        table_frames(packed, 0, FrameSize::Classic).iter().for_each(|frame| drive.receive(frame));
+        table_frames(packed, 0, FrameSize::Classic).iter().for_each(|frame| drive.receive(frame, 0));
         let refused = reason(&mut drive);
         send(&mut drive, ids::BROADCAST, &HostMessage::Start { table: 1, tick: 0 });
         let reason = refused.or_else(|| reason(&mut drive));
@@ -246,7 +253,10 @@ fn tables_that_do_not_fit_are_refused_by_name() {
     assert_eq!(axis(&|c| c.limits.velocity = 1.0), Some(Reject::Limits));
     assert_eq!(axis(&|c| c.limits.jerk = Some(1.0)), Some(Reject::Limits));
     let needed = packed.header.shared_bytes();
-    assert_eq!(refuse(good, &packed, 8), Some(Reject::NoRoom { needed, available: 8 }));
+    assert_eq!(
+        refuse(good, &packed, 8),
+        Some(Reject::NoRoom { needed: needed + needed.div_ceil(40), available: 8 })
+    );
     let changed = |change: &dyn Fn(&mut Packed)| {
         let mut packed = packed.clone();
         change(&mut packed);
@@ -271,20 +281,20 @@ fn starts_are_refused_by_name() {
         reason(drive)
     };
     assert_eq!(start(&mut drive, 1, 0), Some(Reject::NotReady));
-    table_frames(&packed, 0, FrameSize::Classic).iter().for_each(|frame| drive.receive(frame));
+    table_frames(&packed, 0, FrameSize::Classic).iter().for_each(|frame| drive.receive(frame, 0));
     drive.tick();
     assert_eq!(start(&mut drive, 2, 9), Some(Reject::NotReady));
     assert_eq!(start(&mut drive, 1, 0), Some(Reject::Late { tick: 1 }));
     assert_eq!(start(&mut drive, 1, 1), None);
     assert_eq!(start(&mut drive, 1, 1), None);
     assert_eq!(start(&mut drive, 1, 2), Some(Reject::Busy));
-    send(&mut drive, ids::STOP, &HostMessage::Stop);
+    send(&mut drive, ids::BROADCAST, &HostMessage::Stop);
     assert_eq!(drive.status().state, State::Idle);
-    assert_eq!(start(&mut drive, 1, 5), Some(Reject::NotReady));
+    assert_eq!(start(&mut drive, 1, 5), Some(Reject::Epoch { epoch: 1 }));
     assert!((0..50).all(|_| drive.tick() == Setpoint::at_rest(start_of(&packed))));
-    let lonely = HostMessage::Data { table: 1, part: Part::Shared, offset: 0, bytes: &[1] };
+    let lonely = HostMessage::Seal { table: 1, part: Part::Shared, crc: 1 };
     send(&mut drive, ids::BROADCAST, &lonely);
-    assert_eq!(reason(&mut drive), Some(Reject::NotOpen));
+    assert_eq!(reason(&mut drive), Some(Reject::Epoch { epoch: 1 }));
 }
 
 #[test]
@@ -293,7 +303,7 @@ fn a_running_table_survives_stop_and_every_message_about_others() {
     let expected = evaluated(&packed, 0);
     let (mut a, mut b) = ([0; 4096], [0; 4096]);
     let mut drive = enabled(config(0, start_of(&packed)), &mut a, &mut b);
-    table_frames(&packed, 0, FrameSize::Classic).iter().for_each(|frame| drive.receive(frame));
+    table_frames(&packed, 0, FrameSize::Classic).iter().for_each(|frame| drive.receive(frame, 0));
     send(&mut drive, ids::BROADCAST, &HostMessage::Start { table: 1, tick: 0 });
     let open = |table| HostMessage::Open(TableHeader { table, ..packed.header });
     for (tick, setpoint) in expected.iter().enumerate() {
@@ -301,7 +311,9 @@ fn a_running_table_survives_stop_and_every_message_about_others() {
             1 => send(&mut drive, ids::STOP, &HostMessage::Stop),
             2 => send(&mut drive, ids::BROADCAST, &open(1)),
             3 => send(&mut drive, ids::BROADCAST, &open(2)),
-            _ if tick > 0 => packed.shared_messages().for_each(|m| send(&mut drive, ids::BROADCAST, &m)),
+            _ if tick > 0 => {
+                table_frames(&packed, 0, FrameSize::Classic).iter().for_each(|f| drive.receive(f, 0));
+            }
             _ => {}
         }
         assert_eq!(drive.tick(), *setpoint, "tick {tick}");

@@ -104,7 +104,7 @@ fn play(packed: &Packed, limits: &[Limits], changes: &[Change], ticks: u64) -> O
     for tick in 0..ticks {
         if let Some(change) = next.next_if(|change| change.tick == tick) {
             for drive in &mut drives {
-                drive.handle(&HostMessage::Override { permille: change.permille, tick });
+                drive.handle(&HostMessage::Override { permille: change.permille, tick, number: 0 });
                 assert_eq!(drive.poll_answer(), None);
             }
         }

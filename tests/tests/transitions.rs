@@ -74,9 +74,13 @@ fn act(
         (Power::OperationEnabled, State::Running | State::Held | State::Armed) => match random.whole(0, 9) {
             0 => drive.handle(&HostMessage::QuickStop),
             1 => drive.trip(1),
-            2..=4 => drive.handle(&HostMessage::Override { permille: 0, tick }),
-            5..=7 => drive.handle(&HostMessage::Override { permille: 1000, tick }),
-            _ => drive.handle(&HostMessage::Override { permille: random.whole(0, 1000) as u16, tick }),
+            2..=4 => drive.handle(&HostMessage::Override { permille: 0, tick, number: 0 }),
+            5..=7 => drive.handle(&HostMessage::Override { permille: 1000, tick, number: 0 }),
+            _ => drive.handle(&HostMessage::Override {
+                permille: random.whole(0, 1000) as u16,
+                tick,
+                number: 0,
+            }),
         },
         (Power::OperationEnabled, State::Moving) => match random.whole(0, 5) {
             0 => drive.handle(&HostMessage::QuickStop),

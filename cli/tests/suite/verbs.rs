@@ -319,8 +319,17 @@ fn fields(value: &Value, found: &mut BTreeSet<String>) {
 /// What a drive says of itself, as `flash` tells it.
 fn flashed(schema: u64) -> FlashJson {
     let limits = Limits { velocity: 1e6, acceleration: 1e8, jerk: None };
-    let identity =
-        Identity { version: [1, 2, 3], format: 1, schema, axis: 4, tick_ns: 250_000, limits, room: 4096 };
+    let identity = Identity {
+        version: [1, 2, 3],
+        format: 1,
+        schema,
+        axis: 4,
+        tick_ns: 250_000,
+        limits,
+        room: 4096,
+        boot: 7,
+        epoch: 3,
+    };
     FlashJson::of("emulated", Path::new("drive"), Node::new(5).unwrap(), &identity, schema == schema::HASH)
 }
 

@@ -1,6 +1,7 @@
 use super::*;
 use crate::axis::AxisConfig;
-use protocol::bus::{FrameSize, Node, Segments, ids};
+use crate::session::Watch;
+use protocol::bus::{FrameSize, Node, Segments, data, ids};
 use protocol::message::{DriveMessage, HostMessage, Part, Reject, State, decode, encode, part_crc};
 use protocol::power::{Power, PowerEvent};
 use protocol::table::control::ControlWriter;
@@ -15,17 +16,27 @@ const LIMITS: Limits = Limits { velocity: 1e6, acceleration: 1e8, jerk: Some(1e1
 
 fn config() -> DriveConfig {
     let node = Node::new(1).unwrap();
-    DriveConfig { node, frames: FrameSize::Fd, axis: AxisConfig::new(0, 1_000_000, LIMITS) }
+    let watch = Watch { host_ticks: 0, ..Watch::new(1_000_000, 0) };
+    DriveConfig { node, frames: FrameSize::Fd, axis: AxisConfig::new(0, 1_000_000, LIMITS), watch }
 }
 
 fn frames(message: &HostMessage<'_>) -> Vec<Frame> {
+    frames_of(1, message)
+}
+
+fn frames_of(epoch: u16, message: &HostMessage<'_>) -> Vec<Frame> {
     let mut buffer = [0; protocol::bus::MESSAGE_BYTES];
     let bytes = encode(message, &mut buffer).unwrap();
-    Segments::new(ids::BROADCAST, FrameSize::Fd, bytes).unwrap().collect()
+    Segments::new(ids::BROADCAST, FrameSize::Fd, epoch, bytes).unwrap().collect()
 }
 
 /// A move of 8000 counts there, or back.
 fn table(number: u32, back: bool) -> Vec<Vec<Frame>> {
+    table_of(1, number, back)
+}
+
+fn table_of(epoch: u16, number: u32, back: bool) -> Vec<Vec<Frame>> {
+    let frames = |message: &HostMessage<'_>| frames_of(epoch, message);
     let (mut shared, mut spans, mut writer) = (Vec::new(), Vec::new(), SpanWriter::default());
     geometry::write(&mut shared, GeometrySpan { length: 2048, spans: 5 });
     writer.push(&mut spans, Some(200), None);
@@ -66,7 +77,9 @@ fn table(number: u32, back: bool) -> Vec<Vec<Frame>> {
         (Part::Shared, &shared, part_crc(&header, &[&shared]).unwrap()),
         (Part::Axis, &controls, part_crc(&axis, &[&controls]).unwrap()),
     ] {
-        all.push(frames(&HostMessage::Data { table: number, part, offset: 0, bytes }));
+        let id = if part == Part::Shared { ids::DATA } else { Node::new(1).unwrap().data() };
+        let units = data::units(FrameSize::Fd);
+        all.push((0..).map_while(|k| data::frame(id, FrameSize::Fd, number, bytes, k * units)).collect());
         all.push(frames(&HostMessage::Seal { table: number, part, crc }));
     }
     all
@@ -76,16 +89,30 @@ fn answers(talk: &mut Talk<'_, '_>) -> Vec<DriveMessage> {
     let mut receiver = protocol::bus::Reassembler::<64>::new();
     let mut all = Vec::new();
     while let Some(frame) = talk.poll_transmit() {
-        if let Some(bytes) = receiver.push(frame.data()).unwrap() {
+        if frame.id() != config().node.from_drive() {
+            continue;
+        }
+        if let Some((_, bytes)) = receiver.push(frame.data()).unwrap() {
             all.push(decode(bytes).unwrap());
         }
     }
     all
 }
 
+/// Opens an epoch of a drive at rest, and puts it under torque.
+fn begin(epoch: u16, talk: &mut Talk<'_, '_>, drive: &mut Move<'_, '_>) {
+    frames_of(epoch, &HostMessage::Begin { boot: 0, members: 1 }).iter().for_each(|f| talk.receive(f, 0));
+    drive.tick();
+    assert!(answers(talk).contains(&DriveMessage::Begun { epoch }));
+    for event in [PowerEvent::Shutdown, PowerEvent::EnableOperation] {
+        frames_of(epoch, &HostMessage::Power(event)).iter().for_each(|frame| talk.receive(frame, 0));
+    }
+    drive.tick();
+}
+
 fn enable(talk: &mut Talk<'_, '_>) {
     for event in [PowerEvent::Shutdown, PowerEvent::EnableOperation] {
-        frames(&HostMessage::Power(event)).iter().for_each(|frame| talk.receive(frame));
+        frames(&HostMessage::Power(event)).iter().for_each(|frame| talk.receive(frame, 0));
     }
 }
 
@@ -98,13 +125,13 @@ type Step = fn(&mut Talk<'_, '_>);
 fn wherever_the_ticks_fall_the_axis_ends_where_it_was_sent() {
     let script: [Step; 9] = [
         |talk| enable(talk),
-        |talk| table(1, false).concat().iter().for_each(|f| talk.receive(f)),
-        |talk| frames(&HostMessage::Start { table: 1, tick: 4 }).iter().for_each(|f| talk.receive(f)),
-        |talk| table(2, true).concat().iter().for_each(|f| talk.receive(f)),
-        |talk| frames(&HostMessage::Start { table: 1, tick: 4 }).iter().for_each(|f| talk.receive(f)),
-        |talk| frames(&HostMessage::Start { table: 2, tick: 500 }).iter().for_each(|f| talk.receive(f)),
-        |talk| frames(&HostMessage::Stop).iter().for_each(|f| talk.receive(f)),
-        |talk| frames(&HostMessage::QuickStop).iter().for_each(|f| talk.receive(f)),
+        |talk| table(1, false).concat().iter().for_each(|f| talk.receive(f, 0)),
+        |talk| frames(&HostMessage::Start { table: 1, tick: 4 }).iter().for_each(|f| talk.receive(f, 0)),
+        |talk| table(2, true).concat().iter().for_each(|f| talk.receive(f, 0)),
+        |talk| frames(&HostMessage::Start { table: 1, tick: 4 }).iter().for_each(|f| talk.receive(f, 0)),
+        |talk| frames(&HostMessage::Start { table: 2, tick: 500 }).iter().for_each(|f| talk.receive(f, 0)),
+        |talk| frames(&HostMessage::Stop).iter().for_each(|f| talk.receive(f, 0)),
+        |talk| frames(&HostMessage::QuickStop).iter().for_each(|f| talk.receive(f, 0)),
         |talk| drop(answers(talk)),
     ];
     // Five ticks among nine steps: each step may come before or after each tick.
@@ -115,9 +142,10 @@ fn wherever_the_ticks_fall_the_axis_ends_where_it_was_sent() {
             continue;
         }
         cases += 1;
-        let (mut a, mut b) = ([0; 64], [0; 64]);
+        let (mut a, mut b) = ([0; 80], [0; 80]);
         let mut between = Between::new();
         let (mut talk, mut drive) = between.drive(config(), &mut a, &mut b);
+        begin(1, &mut talk, &mut drive);
         let mut steps = script.iter();
         let mut last = Setpoint::at_rest(0);
         for turn in 0..script.len() + TICKS {
@@ -136,10 +164,9 @@ fn wherever_the_ticks_fall_the_axis_ends_where_it_was_sent() {
         }
         assert!(last.done, "{pattern:b} {last:?}");
         assert_eq!(drive.motion().power(), Power::QuickStopActive, "{pattern:b}");
-        enable(&mut talk);
-        drive.tick();
+        begin(2, &mut talk, &mut drive);
         for number in [11, 12] {
-            table(number, false).concat().iter().for_each(|f| talk.receive(f));
+            table_of(2, number, false).concat().iter().for_each(|f| talk.receive(f, 0));
             let ready = answers(&mut talk);
             let is_ready =
                 |a: &DriveMessage| matches!(a, DriveMessage::Ready { table, .. } if *table == number);
@@ -153,11 +180,12 @@ fn wherever_the_ticks_fall_the_axis_ends_where_it_was_sent() {
 #[test]
 fn two_threads_hand_tables_to_each_other() {
     const TABLES: u32 = 60;
-    let (mut a, mut b) = ([0; 64], [0; 64]);
+    let (mut a, mut b) = ([0; 80], [0; 80]);
     let mut between = Between::new();
     let mut config = config();
     config.axis.status_ticks = 3;
     let (mut talk, mut drive) = between.drive(config, &mut a, &mut b);
+    begin(1, &mut talk, &mut drive);
     let stop = std::sync::atomic::AtomicBool::new(false);
     let order = std::sync::atomic::Ordering::Relaxed;
     std::thread::scope(|scope| {
@@ -171,12 +199,11 @@ fn two_threads_hand_tables_to_each_other() {
             }
             last
         });
-        enable(&mut talk);
         for number in 1..=TABLES {
             let (mut ready, mut started, mut tick) = (false, false, 0);
             for round in 0u64.. {
                 if !ready && round % 64 == 0 {
-                    table(number, number % 2 == 0).concat().iter().for_each(|f| talk.receive(f));
+                    table(number, number % 2 == 0).concat().iter().for_each(|f| talk.receive(f, 0));
                 }
                 let mut done = false;
                 for answer in answers(&mut talk) {
@@ -195,7 +222,7 @@ fn two_threads_hand_tables_to_each_other() {
                 }
                 if ready && !started && tick > 0 {
                     let start = HostMessage::Start { table: number, tick: tick + 5_000 };
-                    frames(&start).iter().for_each(|f| talk.receive(f));
+                    frames(&start).iter().for_each(|f| talk.receive(f, 0));
                     started = true;
                 }
                 if done {

@@ -6,6 +6,7 @@ use protocol::power::{Power, PowerEvent};
 use super::{Armed, Change, Excursion, Motion};
 use crate::axis::{AxisConfig, QuickStopOption};
 use crate::course::Course;
+use crate::evaluate::Setpoint;
 use crate::orders::Order;
 use crate::rate::of_permille;
 use crate::store::Loaded;
@@ -35,15 +36,69 @@ impl<'a> Motion<'a> {
                 (table, if plays || waits { Ok(()) } else { Err(reason) }, false)
             }
             Order::Stop => {
-                self.disarm();
+                self.cancel();
                 (0, Ok(()), false)
             }
             Order::MoveTo { position, velocity } => (0, self.move_to(position, velocity), true),
             Order::MoveAt { velocity } => (0, self.move_at(velocity), true),
             Order::Power(event) => (0, self.change_power(event), event == PowerEvent::QuickStop),
             Order::Override { permille, tick } => (0, self.change_rate(permille, tick), false),
-            Order::Alive => (0, Ok(()), false),
+            Order::Hold { tick } => {
+                self.hold(tick);
+                (0, Ok(()), true)
+            }
+            // These have answers of their own.
+            Order::Alive | Order::Clear | Order::Shift { .. } | Order::Report => (0, Ok(()), false),
         }
+    }
+
+    /// Nothing starts any more. A table that is to take over from the one that plays still does: where the path ends must not
+    /// depend on when a drive has heard of it.
+    fn cancel(&mut self) {
+        if self.playing.is_none() {
+            self.disarm();
+        } else if let Some(armed) = self.armed.take() {
+            self.give_back(armed.table, false);
+        }
+    }
+
+    /// Stops on the path from a tick on; what is not on a path stops at once. A table that is to take over still does: where
+    /// the path ends must not depend on when a drive has heard of the stop.
+    #[inline(never)]
+    pub(super) fn hold(&mut self, tick: u64) {
+        self.cancel();
+        if self.excursion.is_some() {
+            return self.land();
+        }
+        if self.playing.is_none() {
+            self.drop_tables();
+            return;
+        }
+        let tick = tick.max(self.tick);
+        let holds = |change: &Change| change.target == 0 && change.tick <= tick;
+        if !self.change.as_ref().is_some_and(holds) && self.rate.target() != 0 {
+            self.change = Some(Change { target: 0, tick });
+        }
+    }
+
+    /// Forgets everything, if the axis is at rest and stays there.
+    pub(super) fn clear(&mut self) -> bool {
+        let held = self.rate.is_held() && self.change.is_none();
+        let rests = self.excursion.is_none() && self.armed.is_none() && (self.playing.is_none() || held);
+        if rests {
+            self.last = Setpoint::at_rest(self.last.position);
+            self.drop_tables();
+        }
+        rests
+    }
+
+    /// Counts on from another tick, if the axis is at rest.
+    pub(super) fn shift(&mut self, ticks: i64) -> bool {
+        let rests = !self.moves() && self.change.is_none();
+        if rests {
+            self.tick = self.tick.saturating_add_signed(ticks);
+        }
+        rests
     }
 
     /// Whether a table may be armed for a tick.

@@ -1,5 +1,6 @@
 use super::*;
 use crate::guard::Guard;
+use protocol::bus::data;
 use protocol::message::{Fault, Reject, State};
 use protocol::message::{Part, part_crc};
 use protocol::power::{Power, PowerEvent};
@@ -98,7 +99,7 @@ fn bring_warped(player: &mut Player<'_>, table: u32, warp: Option<Warp>) {
         (Part::Shared, &shared, part_crc(&header, &[&shared]).unwrap()),
         (Part::Axis, &controls, part_crc(&axis, &[&controls]).unwrap()),
     ] {
-        player.handle(&HostMessage::Data { table, part, offset: 0, bytes });
+        player.handle(&HostMessage::Data { tag: data::tag(table), part, unit: 0, bytes });
         player.handle(&HostMessage::Seal { table, part, crc });
     }
 }

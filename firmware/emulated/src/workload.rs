@@ -8,8 +8,9 @@ use firmware_core::evaluate::{Cursor, Setpoint};
 use firmware_core::player::Player;
 use firmware_core::table::TableView;
 use firmware_core::time::PathClock;
+use protocol::bus::data;
 use protocol::checksum::Fnv64;
-use protocol::message::{DATA_BYTES, HostMessage, Part, part_crc};
+use protocol::message::{HostMessage, Part, part_crc};
 use protocol::power::PowerEvent;
 use protocol::table::{AxisHeader, TableHeader};
 
@@ -133,10 +134,10 @@ pub fn drive(
             (Part::Axis, controls, part_crc(&axis, &[controls]).ok()?),
         ];
         for (part, bytes, crc) in sealed {
-            let mut offset = 0u32;
-            for bytes in bytes.chunks(DATA_BYTES) {
-                player.handle(&HostMessage::Data { table, part, offset, bytes });
-                offset += bytes.len() as u32;
+            let mut unit = 0u32;
+            for bytes in bytes.chunks(12 * data::UNIT) {
+                player.handle(&HostMessage::Data { tag: data::tag(table), part, unit, bytes });
+                unit += 12;
             }
             player.handle(&HostMessage::Seal { table, part, crc });
         }
@@ -148,13 +149,13 @@ pub fn drive(
         let fate = (chance.unit() * 3.0) as u8;
         let permille = if chance.unit() < 0.5 { 0 } else { (chance.unit() * 1000.0) as u16 };
         if fate > 0 {
-            player.handle(&HostMessage::Override { permille, tick: change });
+            player.handle(&HostMessage::Override { permille, tick: change, number: 0 });
         }
         let mut tick = 0u64;
         let mut returns = false;
         loop {
             if fate == 1 && tick == change + 600 {
-                player.handle(&HostMessage::Override { permille: 1000, tick });
+                player.handle(&HostMessage::Override { permille: 1000, tick, number: 0 });
             }
             let stops = fate == 2 && tick == stop;
             if stops {

@@ -7,6 +7,8 @@
 #![no_main]
 
 use core::cell::Cell;
+use core::mem::MaybeUninit;
+use core::sync::atomic::{AtomicI32, Ordering};
 
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::exception;
@@ -23,7 +25,9 @@ use embassy_stm32::{Config, bind_interrupts, can};
 use firmware_core::axis::AxisConfig;
 use firmware_core::drive::DriveConfig;
 use firmware_core::evaluate::Setpoint;
+use firmware_core::clock::Reload;
 use firmware_core::halves::{Between, Move};
+use firmware_core::session::Watch;
 use protocol::bus::{Frame, FrameSize, Node};
 use protocol::table::Limits;
 
@@ -37,6 +41,8 @@ const DATA_BIT_RATE: u32 = 2_000_000;
 const TICK_NS: u32 = 250_000;
 /// Room for one table; there are two [bytes].
 const ROOM: usize = 40 * 1024;
+/// Between two beats [ticks].
+const STATUS_TICKS: u32 = 80;
 /// Address on the bus; the axis is the one before it.
 const NODE: u8 = match option_env!("FEEDSPLINE_NODE") {
     Some(digits) => match u8::from_str_radix(digits, 10) {
@@ -46,13 +52,17 @@ const NODE: u8 = match option_env!("FEEDSPLINE_NODE") {
     None => 1,
 };
 
+/// A number that every start-up finds one further: memory that no start-up clears, and that holds anything after power-up.
+#[unsafe(link_section = ".uninit.boot")]
+static mut BOOT: MaybeUninit<u32> = MaybeUninit::uninit();
+
 const CONFIG: DriveConfig = {
     let Some(node) = Node::new(NODE) else { panic!("FEEDSPLINE_NODE is a number from 1 to 127") };
     DriveConfig {
         node,
         frames: if cfg!(feature = "fd") { FrameSize::Fd } else { FrameSize::Classic },
         axis: AxisConfig {
-            status_ticks: 400,
+            status_ticks: STATUS_TICKS,
             // Limits are those of the motor and the slide: set them before anything moves, and the travel.
             ..AxisConfig::new(
                 NODE - 1,
@@ -60,6 +70,7 @@ const CONFIG: DriveConfig = {
                 Limits { velocity: 1e6, acceleration: 1e8, jerk: Some(1e10) },
             )
         },
+        watch: Watch::new(TICK_NS, STATUS_TICKS),
     }
 };
 
@@ -81,12 +92,20 @@ async fn main(_spawner: Spawner) {
     let (a, b, between, place) =
         unsafe { (&mut *(&raw mut A), &mut *(&raw mut B), &mut *(&raw mut BETWEEN), &mut *(&raw mut PLACE)) };
     let peripherals = embassy_stm32::init(clocks());
-    let (mut talk, moves) = between.drive(CONFIG, a, b);
+    let mut config = CONFIG;
+    // SAFETY: this runs once, nobody else names it, and a volatile read makes some number of whatever the memory holds.
+    config.watch.boot = unsafe {
+        let place = (&raw mut BOOT).cast::<u32>();
+        let boot = place.read_volatile().wrapping_add(1);
+        place.write_volatile(boot);
+        boot
+    };
+    let (mut talk, moves) = between.drive(config, a, b);
     critical_section::with(|cs| MOVES.borrow(cs).set(Some(place.insert(moves))));
     if let Some(core) = cortex_m::Peripherals::take() {
         let mut timer = core.SYST;
         timer.set_clock_source(SystClkSource::Core);
-        timer.set_reload(CLOCK_HZ / 1_000_000 * (TICK_NS / 1_000) - 1);
+        timer.set_reload(TICK_COUNTS - 1);
         timer.clear_current();
         timer.enable_counter();
         timer.enable_interrupt();
@@ -100,12 +119,28 @@ async fn main(_spawner: Spawner) {
     let (mut out, mut into, _) = bus.into_normal_mode().split();
     loop {
         if let Either::First(Some(frame)) = select(receive(&mut into), yield_now()).await {
-            talk.receive(&frame);
+            talk.receive(&frame, phase_ns());
         }
         if let Some(frame) = talk.poll_transmit() {
             send(&mut out, &frame).await;
+            talk.sent(&frame, phase_ns());
         }
+        TRIM_PPB.store(talk.trim_ppb(), Ordering::Relaxed);
     }
+}
+
+/// Counts of the core's timer in a control tick.
+const TICK_COUNTS: u32 = CLOCK_HZ / 1_000_000 * (TICK_NS / 1_000);
+
+/// By how much ticks are to be shorter [1e-9]: from the half that talks to the control interrupt.
+static TRIM_PPB: AtomicI32 = AtomicI32::new(0);
+
+/// Since the present tick began [ns].
+///
+/// Frames are stamped when this loop takes them up, some microseconds late; the controller's own time stamps would do better.
+fn phase_ns() -> u32 {
+    let counts = TICK_COUNTS.saturating_sub(1).saturating_sub(cortex_m::peripheral::SYST::get_current());
+    (u64::from(counts) * 1_000_000_000 / u64::from(CLOCK_HZ)) as u32
 }
 
 /// The next data frame with a short identifier. The bus' errors are the controller's to count and to recover from.
@@ -164,6 +199,11 @@ fn clocks() -> Config {
 #[exception]
 fn SysTick() {
     static mut HERE: Option<&'static mut Move<'static, 'static>> = None;
+    static mut RELOAD: Reload = Reload::new(TICK_COUNTS);
+    // It counts for the tick behind the next one.
+    let counts = RELOAD.next(TRIM_PPB.load(Ordering::Relaxed));
+    // SAFETY: a write to the reload register, which nobody else writes any more.
+    unsafe { (*cortex_m::peripheral::SYST::PTR).rvr.write(counts - 1) };
     if HERE.is_none() {
         *HERE = critical_section::with(|cs| MOVES.borrow(cs).take());
     }

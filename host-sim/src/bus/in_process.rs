@@ -20,6 +20,7 @@ pub struct InProcessBus {
 struct Node {
     sending: VecDeque<(Nanoseconds, Frame)>,
     received: VecDeque<Received>,
+    sent: Option<Received>,
 }
 
 impl InProcessBus {
@@ -65,6 +66,7 @@ impl Bus for InProcessBus {
             for (i, node) in self.nodes.iter_mut().enumerate() {
                 if i == sender {
                     node.sending.pop_front();
+                    node.sent = Some(Received { time: end, frame });
                 } else {
                     node.received.push_back(Received { time: end, frame });
                 }
@@ -74,6 +76,10 @@ impl Bus for InProcessBus {
 
     fn receive(&mut self, node: NodeIndex) -> Option<Received> {
         self.nodes[node.0].received.pop_front()
+    }
+
+    fn sent(&mut self, node: NodeIndex) -> Option<Received> {
+        self.nodes[node.0].sent.take()
     }
 
     fn waiting(&self, node: NodeIndex) -> usize {

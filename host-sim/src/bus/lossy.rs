@@ -47,6 +47,10 @@ impl<B: Bus> Bus for Lossy<B> {
         None
     }
 
+    fn sent(&mut self, node: NodeIndex) -> Option<Received> {
+        self.inner.sent(node)
+    }
+
     fn waiting(&self, node: NodeIndex) -> usize {
         self.inner.waiting(node)
     }

@@ -72,6 +72,10 @@ impl<B: Bus, W: Write> Bus for Recorder<B, W> {
         self.inner.receive(node)
     }
 
+    fn sent(&mut self, node: NodeIndex) -> Option<Received> {
+        self.inner.sent(node)
+    }
+
     fn waiting(&self, node: NodeIndex) -> usize {
         self.inner.waiting(node)
     }

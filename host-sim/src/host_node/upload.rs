@@ -1,16 +1,18 @@
 //! One table on its way to the drives.
 
 use planner::feed::pack::Packed;
-use protocol::message::{DATA_BYTES, DriveMessage, HostMessage, Part, Reject};
+use protocol::bus::FrameSize;
+use protocol::bus::data::{UNIT, units};
+use protocol::message::{DriveMessage, Gaps, HostMessage, Part, Reject};
 
 use super::HostError;
 
-/// One message of an upload; `axis` is `None` for the shared part.
+/// One message or data frame of an upload; `axis` is `None` for the shared part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Block {
     Open,
     OpenAxis(usize),
-    Data { axis: Option<usize>, offset: usize },
+    Data { axis: Option<usize>, unit: u32 },
     Seal(Option<usize>),
 }
 
@@ -18,6 +20,8 @@ pub(super) enum Block {
 #[derive(Clone, Debug)]
 pub(super) struct Upload<'a> {
     packed: &'a Packed,
+    /// Units that a frame carries.
+    stride: u32,
     drives: Vec<Progress>,
     /// A drive has lost the beginning, so everything is sent again.
     anew: bool,
@@ -27,6 +31,8 @@ pub(super) struct Upload<'a> {
     waiting_since: Option<u64>,
     /// Rounds since anything was heard to go forwards.
     rounds: u32,
+    /// Least data frames that were ever missing at once.
+    least: usize,
 }
 
 /// How far one drive has come.
@@ -34,47 +40,53 @@ pub(super) struct Upload<'a> {
 struct Progress {
     /// How long the table plays, once it is ready [ticks].
     ready: Option<u64>,
-    /// Where the shared part and the axis part have a gap, if the drive says so.
-    gap: [Option<u32>; 2],
-    /// The furthest gap it ever had.
-    furthest: [u32; 2],
+    /// What it lacks of the shared part and of the axis part, if it has said so.
+    gaps: [Option<Gaps>; 2],
 }
 
 impl<'a> Upload<'a> {
-    pub(super) fn new(packed: &'a Packed, drives: usize) -> Self {
+    pub(super) fn new(packed: &'a Packed, drives: usize, size: FrameSize) -> Self {
         let drives = vec![Progress::default(); drives];
-        Self { packed, drives, anew: false, refused: false, waiting_since: None, rounds: 0 }
+        let stride = units(size);
+        Self {
+            packed,
+            stride,
+            drives,
+            anew: false,
+            refused: false,
+            waiting_since: None,
+            rounds: 0,
+            least: usize::MAX,
+        }
+    }
+
+    pub(super) fn packed(&self) -> &'a Packed {
+        self.packed
     }
 
     pub(super) fn table(&self) -> u32 {
         self.packed.header.table
     }
 
-    /// All messages of the table, in order.
+    /// Everything that carries the table, in order.
     pub(super) fn everything(&self) -> impl Iterator<Item = Block> + use<'a> {
-        let (packed, axes) = (self.packed, self.packed.axes.len());
+        let (packed, axes, stride) = (self.packed, self.packed.axes.len(), self.stride as usize);
         let parts = move || core::iter::once(None).chain((0..axes).map(Some));
-        let data = parts().flat_map(move |axis| data_from(packed, axis, 0));
+        let data = parts().flat_map(move |axis| {
+            let units = packed.part(axis).len().div_ceil(UNIT) as u32;
+            (0..units).step_by(stride).map(move |unit| Block::Data { axis, unit })
+        });
         let open = (0..axes).map(Block::OpenAxis);
         core::iter::once(Block::Open).chain(open).chain(data).chain(parts().map(Block::Seal))
     }
 
     /// The message of a block, and the axis it goes to; `None` goes to all.
     pub(super) fn message(&self, block: Block) -> (Option<usize>, HostMessage<'a>) {
-        let (packed, table) = (self.packed, self.table());
-        let part = |axis: Option<usize>| if axis.is_some() { Part::Axis } else { Part::Shared };
+        let packed = self.packed;
         match block {
             Block::Open => (None, HostMessage::Open(packed.header)),
             Block::OpenAxis(axis) => (Some(axis), HostMessage::OpenAxis(packed.axes[axis].header)),
-            Block::Data { axis, offset } => {
-                let bytes = bytes_of(packed, axis);
-                let bytes = &bytes[offset..bytes.len().min(offset + DATA_BYTES)];
-                (axis, HostMessage::Data { table, part: part(axis), offset: offset as u32, bytes })
-            }
-            Block::Seal(axis) => {
-                let crc = axis.map_or_else(|| packed.shared_crc(), |axis| packed.axes[axis].crc());
-                (axis, HostMessage::Seal { table, part: part(axis), crc })
-            }
+            Block::Seal(axis) | Block::Data { axis, .. } => (axis, packed.seal(axis)),
         }
     }
 
@@ -85,17 +97,12 @@ impl<'a> Upload<'a> {
                 self.drives[axis].ready = Some(ticks);
                 self.rounds = 0;
             }
+            DriveMessage::Missing { table, part, gaps } if table == self.table() => {
+                self.drives[axis].gaps[part as usize] = Some(gaps);
+            }
             DriveMessage::Reject { table, reason } if table == self.table() => match reason {
-                Reject::Incomplete { part, received } => {
-                    let p = part as usize;
-                    let drive = &mut self.drives[axis];
-                    drive.gap[p] = Some(received);
-                    if received > drive.furthest[p] {
-                        drive.furthest[p] = received;
-                        self.rounds = 0;
-                    }
-                }
-                Reject::Checksum(part) => self.drives[axis].gap[part as usize] = Some(0),
+                // Its bits were wiped: everything is missing, and it says so when it is asked again.
+                Reject::Checksum(_) => self.rounds += 1,
                 Reject::NotOpen => self.anew = true,
                 Reject::NotReady | Reject::Busy | Reject::Late { .. } | Reject::Overlap { .. } => {
                     (self.anew, self.refused) = (true, true);
@@ -112,6 +119,11 @@ impl<'a> Upload<'a> {
         self.refused
     }
 
+    /// What was refused before a start was sent does not concern it.
+    pub(super) fn hear_no_evil(&mut self) {
+        self.refused = false;
+    }
+
     /// How long the table plays, once all drives are ready [ticks].
     pub(super) fn agreed(&self) -> Result<Option<u64>, HostError> {
         let Some(first) = self.drives.first().and_then(|d| d.ready) else { return Ok(None) };
@@ -125,12 +137,14 @@ impl<'a> Upload<'a> {
 
     /// Whether the drives have had `patience` ticks to answer since the last block was sent.
     pub(super) fn is_overdue(&mut self, tick: u64, patience: u64) -> bool {
-        tick >= *self.waiting_since.get_or_insert(tick) + patience
+        let told = self.drives.iter().all(|d| d.ready.is_some() || d.gaps.iter().any(Option::is_some));
+        told || tick >= *self.waiting_since.get_or_insert(tick) + patience
     }
 
     /// Forgets all answers: the drives have forgotten the table.
     pub(super) fn begin_anew(&mut self) {
-        (self.anew, self.refused) = (true, false);
+        (self.anew, self.refused, self.least) = (true, false, usize::MAX);
+        self.drives.fill(Progress::default());
         self.waiting_since = None;
     }
 
@@ -140,39 +154,39 @@ impl<'a> Upload<'a> {
         self.rounds += 1;
         let late = self.drives.iter().position(|d| d.ready.is_none()).unwrap_or(0);
         if self.rounds > max_rounds {
-            return Err(HostError::Silent { axis: late, table: self.table() });
+            return Err(HostError::Silent { axis: late });
         }
         if core::mem::take(&mut self.anew) {
             self.refused = false;
             self.drives.fill(Progress::default());
             return Ok(self.everything().collect());
         }
-        let mut blocks = Vec::new();
-        let shared = self.drives.iter().filter_map(|d| d.gap[Part::Shared as usize]).min();
-        if let Some(from) = shared {
-            blocks.extend(data_from(self.packed, None, from as usize));
-        }
-        for (axis, drive) in self.drives.iter().enumerate() {
-            if let Some(from) = drive.gap[Part::Axis as usize] {
-                blocks.extend(data_from(self.packed, Some(axis), from as usize));
+        let mut units: Vec<(Option<usize>, u32)> = Vec::new();
+        for (axis, drive) in self.drives.iter_mut().enumerate() {
+            for (part, to) in [(Part::Shared, None), (Part::Axis, Some(axis))] {
+                let gaps = drive.gaps[part as usize].take();
+                let stride = self.stride as usize;
+                let length = self.packed.part(to).len().div_ceil(UNIT) as u32;
+                units.extend(gaps.iter().flat_map(Gaps::ranges).flat_map(|gap| {
+                    (gap.start..gap.end.min(length)).step_by(stride).map(move |unit| (to, unit))
+                }));
             }
+        }
+        units.sort_unstable();
+        units.dedup();
+        if !units.is_empty() && units.len() < self.least {
+            (self.rounds, self.least) = (0, units.len());
+        }
+        let mut blocks: Vec<Block> = units.iter().map(|&(axis, unit)| Block::Data { axis, unit }).collect();
+        if blocks.is_empty() {
+            // Whoever is silent may have missed the beginning.
+            blocks.push(Block::Open);
+            let silent = self.drives.iter().enumerate().filter(|(_, d)| d.ready.is_none());
+            blocks.extend(silent.map(|(axis, _)| Block::OpenAxis(axis)));
         }
         blocks.push(Block::Seal(None));
         let silent = self.drives.iter().enumerate().filter(|(_, d)| d.ready.is_none());
         blocks.extend(silent.map(|(axis, _)| Block::Seal(Some(axis))));
-        for drive in &mut self.drives {
-            drive.gap = [None; 2];
-        }
         Ok(blocks)
     }
-}
-
-fn bytes_of(packed: &Packed, axis: Option<usize>) -> &[u8] {
-    axis.map_or(&packed.shared, |axis| &packed.axes[axis].controls)
-}
-
-/// The data messages of a part from `offset` on.
-fn data_from(packed: &Packed, axis: Option<usize>, offset: usize) -> impl Iterator<Item = Block> + use<> {
-    let length = bytes_of(packed, axis).len();
-    (offset..length).step_by(DATA_BYTES).map(move |offset| Block::Data { axis, offset })
 }

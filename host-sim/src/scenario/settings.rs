@@ -8,14 +8,16 @@ use crate::axis_loop::AxisLoopError;
 use crate::bus::BitTiming;
 use crate::host_node::{HostError, HostTiming};
 
-/// Most drives at addresses of a CANopen bus.
-pub(super) const MAX_DRIVES: usize = 127;
+/// Most drives that move together.
+pub(super) const MAX_DRIVES: usize = 32;
 /// Shortest and longest control tick [s].
 const TICK_S: core::ops::RangeInclusive<f64> = 1e-6..=0.1;
 /// Ticks at rest between two tables.
 const HANDOVER_TICKS: u64 = 2;
 /// Longest classic frame, or FD frame at the usual rates [bits at the nominal rate].
 const FRAME_BITS: f64 = 170.0;
+/// Between two signs of life of the host [s]: drives wait ten times as long.
+const ALIVE_S: f64 = 0.02;
 /// Frames of one short message.
 const MESSAGE_FRAMES: f64 = 4.0;
 
@@ -135,6 +137,7 @@ impl SimSettings {
             lead: u64::from(self.status_ticks(tick_s)) + ticks(4.0) + 2 * round,
             answer: 2 * round,
             guard: ticks(4.0),
+            alive: ((ALIVE_S / tick_s) as u64).max(1),
         }
     }
 }

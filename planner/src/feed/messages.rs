@@ -1,43 +1,61 @@
-//! The messages that carry a packed table to the drives.
+//! The frames that carry a packed table to the drives.
 
-use protocol::bus::{Frame, FrameSize, Segments};
-use protocol::message::{DATA_BYTES, HostMessage, MessageBuffer, Part, encode};
+use protocol::bus::{Frame, FrameSize, Node, Segments, data, ids};
+use protocol::message::{HostMessage, MessageBuffer, Part, encode};
 
 use super::pack::Packed;
 
 impl Packed {
-    /// The shared part, for all drives: header, bytes, seal.
-    pub fn shared_messages(&self) -> impl Iterator<Item = HostMessage<'_>> {
-        let open = HostMessage::Open(self.header);
-        part(open, self.header.table, Part::Shared, &self.shared, self.shared_crc())
+    /// The bytes of the shared part, or of an axis part.
+    ///
+    /// # Panics
+    /// There is no such axis.
+    pub fn part(&self, axis: Option<usize>) -> &[u8] {
+        axis.map_or(&self.shared, |axis| &self.axes[axis].controls)
     }
 
-    /// The part of axis `axis`, for its drive, behind the shared header; empty if there is no such axis.
-    pub fn axis_messages(&self, axis: usize) -> impl Iterator<Item = HostMessage<'_>> {
-        self.axes.get(axis).into_iter().flat_map(|axis| {
-            let open = HostMessage::OpenAxis(axis.header);
-            part(open, self.header.table, Part::Axis, &axis.controls, axis.crc())
-        })
+    /// The frame of a part's bytes from a unit on; `None` behind the end. `to` is the drive of an axis part.
+    ///
+    /// # Panics
+    /// There is no such axis.
+    pub fn data_frame(&self, axis: Option<usize>, to: Node, size: FrameSize, unit: u32) -> Option<Frame> {
+        let id = if axis.is_some() { to.data() } else { ids::DATA };
+        data::frame(id, size, self.header.table, self.part(axis), unit)
     }
-}
 
-fn part<'a>(
-    open: HostMessage<'a>,
-    table: u32,
-    part: Part,
-    bytes: &'a [u8],
-    crc: u32,
-) -> impl Iterator<Item = HostMessage<'a>> {
-    let data = bytes.chunks(DATA_BYTES).enumerate().map(move |(i, bytes)| {
-        let offset = (i * DATA_BYTES) as u32;
-        HostMessage::Data { table, part, offset, bytes }
-    });
-    std::iter::once(open).chain(data).chain([HostMessage::Seal { table, part, crc }])
+    /// The seal of a part.
+    ///
+    /// # Panics
+    /// There is no such axis.
+    pub fn seal(&self, axis: Option<usize>) -> HostMessage<'static> {
+        let (part, crc) = match axis {
+            None => (Part::Shared, self.shared_crc()),
+            Some(axis) => (Part::Axis, self.axes[axis].crc()),
+        };
+        HostMessage::Seal { table: self.header.table, part, crc }
+    }
+
+    /// All frames that bring the drive `to` of an axis its table, inside an epoch.
+    ///
+    /// # Panics
+    /// There is no such axis.
+    pub fn frames(&self, axis: usize, to: Node, size: FrameSize, epoch: u16) -> Vec<Frame> {
+        let opens = [HostMessage::Open(self.header), HostMessage::OpenAxis(self.axes[axis].header)];
+        let ids = [ids::BROADCAST, to.to_drive()];
+        let mut all = Vec::new();
+        for ((open, id), part) in opens.iter().zip(ids).zip([None, Some(axis)]) {
+            all.extend(frames(id, size, epoch, open));
+            let data = |k| self.data_frame(part, to, size, k * data::units(size));
+            all.extend((0..).map_while(data));
+            all.extend(frames(id, size, epoch, &self.seal(part)));
+        }
+        all
+    }
 }
 
 /// The frames of a message to the drives that listen to `id`, in order.
-pub fn frames(id: u16, size: FrameSize, message: &HostMessage<'_>) -> Vec<Frame> {
+pub fn frames(id: u16, size: FrameSize, epoch: u16, message: &HostMessage<'_>) -> Vec<Frame> {
     let mut buffer: MessageBuffer = [0; _];
     let bytes = encode(message, &mut buffer).ok();
-    bytes.and_then(|bytes| Segments::new(id, size, bytes)).into_iter().flatten().collect()
+    bytes.and_then(|bytes| Segments::new(id, size, epoch, bytes)).into_iter().flatten().collect()
 }

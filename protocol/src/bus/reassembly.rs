@@ -2,8 +2,8 @@
 
 use heapless::Vec;
 
-use super::BLOCK_OVERHEAD;
 use super::segment::{FIRST, LAST, NUMBER};
+use super::{BLOCK_HEAD, BLOCK_OVERHEAD};
 use crate::checksum::crc32;
 
 /// Why a frame was not taken; the block it belongs to is dropped.
@@ -42,10 +42,10 @@ impl<const N: usize> Reassembler<N> {
         Self { block: Vec::new(), next: None }
     }
 
-    /// Takes one frame's data; gives the message when the block is complete and its checksum holds.
+    /// Takes one frame's data; gives the message, and its epoch, when the block is complete and its checksum holds.
     ///
     /// A first frame always begins anew, whatever came before it.
-    pub fn push(&mut self, data: &[u8]) -> Result<Option<&[u8]>, FrameError> {
+    pub fn push(&mut self, data: &[u8]) -> Result<Option<(u16, &[u8])>, FrameError> {
         let expected = self.next.take();
         let (control, body) = data.split_first().ok_or(FrameError::Empty)?;
         let found = control & NUMBER;
@@ -55,6 +55,11 @@ impl<const N: usize> Reassembler<N> {
         } else {
             expected.ok_or(FrameError::NoStart)?
         };
+        if found.wrapping_add(1) == expected {
+            // The frame before, once more.
+            self.next = Some(expected);
+            return Ok(None);
+        }
         if found != expected {
             return Err(FrameError::Sequence { expected, found });
         }
@@ -69,16 +74,18 @@ impl<const N: usize> Reassembler<N> {
         self.message().map(Some)
     }
 
-    /// The message of the complete block.
-    fn message(&self) -> Result<&[u8], FrameError> {
+    /// Epoch and message of the complete block.
+    fn message(&self) -> Result<(u16, &[u8]), FrameError> {
         let block = self.block.as_slice();
-        let [low, high, ..] = block else { return Err(FrameError::Length) };
+        let [low, high, epoch_low, epoch_high, ..] = block else { return Err(FrameError::Length) };
         let length = usize::from(u16::from_le_bytes([*low, *high]));
-        let covered = block.get(..2 + length).ok_or(FrameError::Length)?;
-        let crc = block.get(2 + length..length + BLOCK_OVERHEAD).ok_or(FrameError::Length)?;
+        let end = BLOCK_HEAD + length;
+        let covered = block.get(..end).ok_or(FrameError::Length)?;
+        let crc = block.get(end..length + BLOCK_OVERHEAD).ok_or(FrameError::Length)?;
         if crc32(covered).to_le_bytes() != crc {
             return Err(FrameError::Checksum);
         }
-        covered.get(2..).ok_or(FrameError::Length)
+        let message = covered.get(BLOCK_HEAD..).ok_or(FrameError::Length)?;
+        Ok((u16::from_le_bytes([*epoch_low, *epoch_high]), message))
     }
 }

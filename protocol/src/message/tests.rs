@@ -5,7 +5,6 @@ use crate::table::{AxisLimit, HeaderField, Joint, Limits, Stream, Warp};
 use proptest::prelude::*;
 
 extern crate std;
-use std::vec;
 use std::vec::Vec;
 
 fn bytes(message: &impl Serialize) -> Vec<u8> {
@@ -44,9 +43,8 @@ const AXIS: AxisHeader = AxisHeader {
 
 #[test]
 fn host_messages_are_pinned() {
-    let data = HostMessage::Data { table: 300, part: Part::Axis, offset: 5, bytes: &[7, 8] };
     let seal = HostMessage::Seal { table: 1, part: Part::Shared, crc: 0x80 };
-    let cases: [(HostMessage<'_>, &[u8]); 15] = [
+    let cases: [(HostMessage<'_>, &[u8]); 16] = [
         (
             HostMessage::Open(HEADER),
             &[0, 1, 0xac, 2, 5, 1, 0xf6, 0, 0, 0, 0x3f, 0xc0, 0x84, 0x3d, 3, 10, 5, 0, 0, 0],
@@ -55,18 +53,19 @@ fn host_messages_are_pinned() {
             HostMessage::OpenAxis(AXIS),
             &[1, 0xac, 2, 2, 4, 1, 0x80, 1, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x40, 1, 0, 0, 0x80, 0x40, 9],
         ),
-        (data, &[2, 0xac, 2, 1, 5, 2, 7, 8]),
-        (seal, &[3, 1, 0, 0x80, 1]),
-        (HostMessage::Start { table: 1, tick: 1000 }, &[4, 1, 0xe8, 7]),
-        (HostMessage::Stop, &[5]),
-        (HostMessage::Identify, &[6]),
-        (HostMessage::QuickStop, &[7]),
-        (HostMessage::MoveTo { position: -1, velocity: None }, &[8, 1, 0]),
-        (HostMessage::MoveTo { position: 1, velocity: Some(1.0) }, &[8, 2, 1, 0, 0, 0x80, 0x3f]),
-        (HostMessage::MoveAt { velocity: -1.0 }, &[9, 0, 0, 0x80, 0xbf]),
-        (HostMessage::Power(PowerEvent::EnableOperation), &[10, 2]),
-        (HostMessage::Override { permille: 500, tick: 7 }, &[11, 0xf4, 3, 7]),
-        (HostMessage::Alive, &[12]),
+        (seal, &[2, 1, 0, 0x80, 1]),
+        (HostMessage::Start { table: 1, tick: 1000 }, &[3, 1, 0xe8, 7]),
+        (HostMessage::Stop, &[4]),
+        (HostMessage::Identify, &[5]),
+        (HostMessage::QuickStop, &[6]),
+        (HostMessage::MoveTo { position: -1, velocity: None }, &[7, 1, 0]),
+        (HostMessage::MoveTo { position: 1, velocity: Some(1.0) }, &[7, 2, 1, 0, 0, 0x80, 0x3f]),
+        (HostMessage::MoveAt { velocity: -1.0 }, &[8, 0, 0, 0x80, 0xbf]),
+        (HostMessage::Power(PowerEvent::EnableOperation), &[9, 2]),
+        (HostMessage::Override { permille: 500, tick: 7, number: 3 }, &[10, 0xf4, 3, 7, 3]),
+        (HostMessage::Alive, &[11]),
+        (HostMessage::Begin { boot: 300, members: 7 }, &[12, 0xac, 2, 7]),
+        (HostMessage::Report, &[13]),
         (
             HostMessage::Open(TableHeader { warp: Some(WARP), joint: Some(JOINT), tail: Some(11), ..HEADER }),
             &[
@@ -98,17 +97,23 @@ fn drive_messages_are_pinned() {
         tick_ns: 1000,
         limits: AXIS.limits,
         room: 4096,
+        boot: 9,
+        epoch: 300,
     };
+    let mut gaps = Gaps::default();
+    gaps.0[..2].copy_from_slice(&[(3, 2), (300, 1)]);
+    assert_eq!(gaps.ranges().collect::<Vec<_>>(), [3..5, 305..306]);
+    assert_eq!(Gaps([(u32::MAX, 2); GAPS]).ranges().count(), 0);
     let telemetry =
         Telemetry { ticks: 200, following_max: 3, following_rms: 1.0, fill_ms: 5, worst_tick: 90 };
-    let cases: [(DriveMessage, &[u8]); 32] = [
+    let cases: [(DriveMessage, &[u8]); 37] = [
         (DriveMessage::Telemetry(telemetry), &[4, 0xc8, 1, 3, 0, 0, 0x80, 0x3f, 5, 90]),
-        (reject(Reject::Target), &[1, 1, 14]),
+        (reject(Reject::Target), &[1, 1, 13]),
         (
             DriveMessage::Identity(identity),
             &[
                 3, 0, 1, 2, 1, 0xac, 2, 2, 0xe8, 7, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x40, 1, 0, 0, 0x80, 0x40,
-                0x80, 0x20,
+                0x80, 0x20, 9, 0xac, 2,
             ],
         ),
         (DriveMessage::Ready { table: 1, ticks: 200, crc: [1, 2] }, &[0, 1, 0xc8, 1, 1, 2]),
@@ -118,22 +123,30 @@ fn drive_messages_are_pinned() {
         (reject(Reject::Table(TableError::End)), &[1, 1, 0, 12]),
         (reject(Reject::Table(TableError::Limit { limit: AxisLimit::Jerk, index: 9 })), &[1, 1, 0, 13, 2, 9]),
         (reject(Reject::Checksum(Part::Axis)), &[1, 1, 1, 1]),
-        (reject(Reject::Incomplete { part: Part::Shared, received: 7 }), &[1, 1, 2, 0, 7]),
-        (reject(Reject::NoRoom { needed: 5, available: 4 }), &[1, 1, 3, 5, 4]),
-        (reject(Reject::Tick { tick_ns: 9 }), &[1, 1, 4, 9]),
-        (reject(Reject::Axis { axis: 3 }), &[1, 1, 5, 3]),
-        (reject(Reject::Limits), &[1, 1, 6]),
-        (reject(Reject::Position { position: -1 }), &[1, 1, 7, 1]),
-        (reject(Reject::Busy), &[1, 1, 8]),
-        (reject(Reject::NotOpen), &[1, 1, 9]),
-        (reject(Reject::NotReady), &[1, 1, 10]),
-        (reject(Reject::Late { tick: 1 }), &[1, 1, 11, 1]),
-        (reject(Reject::Overlap { tick: 2 }), &[1, 1, 12, 2]),
-        (reject(Reject::Fault), &[1, 1, 13]),
-        (reject(Reject::Power(Power::SwitchedOn)), &[1, 1, 15, 2]),
-        (reject(Reject::Moves), &[1, 1, 16]),
-        (reject(Reject::Override), &[1, 1, 17]),
-        (reject(Reject::Joint), &[1, 1, 18]),
+        (reject(Reject::NoRoom { needed: 5, available: 4 }), &[1, 1, 2, 5, 4]),
+        (reject(Reject::Tick { tick_ns: 9 }), &[1, 1, 3, 9]),
+        (reject(Reject::Axis { axis: 3 }), &[1, 1, 4, 3]),
+        (reject(Reject::Limits), &[1, 1, 5]),
+        (reject(Reject::Position { position: -1 }), &[1, 1, 6, 1]),
+        (reject(Reject::Busy), &[1, 1, 7]),
+        (reject(Reject::NotOpen), &[1, 1, 8]),
+        (reject(Reject::NotReady), &[1, 1, 9]),
+        (reject(Reject::Late { tick: 1 }), &[1, 1, 10, 1]),
+        (reject(Reject::Overlap { tick: 2 }), &[1, 1, 11, 2]),
+        (reject(Reject::Fault), &[1, 1, 12]),
+        (reject(Reject::Power(Power::SwitchedOn)), &[1, 1, 14, 2]),
+        (reject(Reject::Moves), &[1, 1, 15]),
+        (reject(Reject::Override), &[1, 1, 16]),
+        (reject(Reject::Joint), &[1, 1, 17]),
+        (reject(Reject::Epoch { epoch: 300 }), &[1, 1, 18, 0xac, 2]),
+        (reject(Reject::Boot), &[1, 1, 19]),
+        (reject(Reject::Clock), &[1, 1, 20]),
+        (reject(Reject::Members), &[1, 1, 21]),
+        (
+            DriveMessage::Missing { table: 1, part: Part::Axis, gaps },
+            &[5, 1, 1, 3, 2, 0xac, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],
+        ),
+        (DriveMessage::Begun { epoch: 300 }, &[6, 0xac, 2]),
         (status(State::Held, Some(Fault::Connection)), &[2, 6, 3, 1, 2, 1, 3, 3]),
         (status(State::Idle, Some(Fault::Board { code: 300 })), &[2, 0, 3, 1, 3, 0xac, 2, 1, 3, 3]),
         (status(State::Idle, None), &[2, 0, 3, 0, 1, 3, 3]),
@@ -152,15 +165,17 @@ fn drive_messages_are_pinned() {
 
 #[test]
 fn the_schema_is_pinned() {
-    assert_eq!(schema::HASH, 0xfdb5_4ff2_527c_7542, "{:#018x}", schema::HASH);
+    assert_eq!(schema::HASH, 0xc9cd_973b_8ec2_7371, "{:#018x}", schema::HASH);
 }
 
 #[test]
-fn the_longest_message_fits_a_block() {
-    let bytes_ = vec![0xff; DATA_BYTES];
-    let data =
-        HostMessage::Data { table: u32::MAX, part: Part::Axis, offset: u32::MAX, bytes: bytes_.as_slice() };
-    assert!(bytes(&data).len() <= MESSAGE_BYTES);
+fn the_longest_messages_fit_their_blocks() {
+    let most = u32::MAX;
+    let begin = HostMessage::Begin { boot: most, members: u128::MAX };
+    assert!(bytes(&begin).len() <= MESSAGE_BYTES);
+    let gaps = Gaps([(1 << 20, 1 << 20); GAPS]);
+    let missing = DriveMessage::Missing { table: most, part: Part::Axis, gaps };
+    assert!(bytes(&missing).len() <= ANSWER_BYTES, "{}", bytes(&missing).len());
 }
 
 #[test]
@@ -192,8 +207,8 @@ fn the_longest_headers_have_checksums() {
 
 #[test]
 fn bytes_behind_a_message_are_refused() {
-    assert_eq!(decode::<HostMessage<'_>>(&[5, 0]), Err(MessageError::LeftOver));
-    assert_eq!(decode::<HostMessage<'_>>(&[13]), Err(MessageError::Malformed));
+    assert_eq!(decode::<HostMessage<'_>>(&[4, 0]), Err(MessageError::LeftOver));
+    assert_eq!(decode::<HostMessage<'_>>(&[14]), Err(MessageError::Malformed));
     assert_eq!(decode::<HostMessage<'_>>(&[]), Err(MessageError::Malformed));
     assert_eq!(encode(&HostMessage::Open(HEADER), &mut [0; 4]), Err(MessageError::NoRoom));
 }
@@ -220,17 +235,20 @@ proptest! {
         message in prop::collection::vec(any::<u8>(), 0..=MESSAGE_BYTES),
         before in prop::collection::vec(any::<u8>(), 0..20),
         size in sizes(),
+        epoch in any::<u16>(),
     ) {
         let mut receiver = Reassembler::<BLOCK_BYTES>::new();
         let _ = receiver.push(&before);
-        let frames: Vec<_> = Segments::new(0x201, size, &message).unwrap().collect();
+        let frames: Vec<_> = Segments::new(0x201, size, epoch, &message).unwrap().collect();
         prop_assert!(frames.len() <= 48);
         let (last, first) = frames.split_last().unwrap();
         for frame in first {
             prop_assert_eq!(frame.id(), 0x201);
             prop_assert_eq!(receiver.push(frame.data()), Ok(None));
+            // Doubled frames are harmless.
+            prop_assert_eq!(receiver.push(frame.data()), Ok(None));
         }
-        prop_assert_eq!(receiver.push(last.data()), Ok(Some(message.as_slice())));
+        prop_assert_eq!(receiver.push(last.data()), Ok(Some((epoch, message.as_slice()))));
     }
 
     #[test]
@@ -242,7 +260,7 @@ proptest! {
         lose in any::<bool>(),
     ) {
         let mut frames: Vec<Vec<u8>> =
-            Segments::new(1, size, &message).unwrap().map(|f| f.data().to_vec()).collect();
+            Segments::new(1, size, 5, &message).unwrap().map(|f| f.data().to_vec()).collect();
         let i = at.index(frames.len());
         if lose {
             frames.remove(i);
@@ -254,7 +272,7 @@ proptest! {
         for frame in &frames {
             // Damage in the zeros that fill a frame harms nobody.
             if let Ok(Some(found)) = receiver.push(frame) {
-                prop_assert_eq!(found, message.as_slice());
+                prop_assert_eq!(found, (5, message.as_slice()));
             }
         }
     }
@@ -268,11 +286,11 @@ proptest! {
             let _ = receiver.push(frame);
         }
         // A good block after any rubbish is taken.
-        let good = Segments::new(1, FrameSize::Classic, b"good").unwrap();
+        let good = Segments::new(1, FrameSize::Classic, 2, b"good").unwrap();
         let mut last = Ok(None);
         for frame in good {
-            last = receiver.push(frame.data()).map(|m| m.map(<[u8]>::to_vec));
+            last = receiver.push(frame.data()).map(|m| m.map(|(epoch, m)| (epoch, m.to_vec())));
         }
-        prop_assert_eq!(last, Ok(Some(b"good".to_vec())));
+        prop_assert_eq!(last, Ok(Some((2, b"good".to_vec()))));
     }
 }

@@ -171,7 +171,7 @@ fn a_fault_in_any_state_of_motion_is_latched() {
         (State::Held, |player| {
             bring(player, 4);
             player.handle(&HostMessage::Start { table: 4, tick: 0 });
-            player.handle(&HostMessage::Override { permille: 0, tick: 20 });
+            player.handle(&HostMessage::Override { permille: 0, tick: 20, number: 0 });
             (0..1_000).for_each(|_| {
                 player.tick();
             });

@@ -23,7 +23,7 @@ fn a_hold_stands_on_the_path_and_what_follows_is_put_off() {
     bring(&mut player, 4);
     player.handle(&HostMessage::Start { table: 4, tick: 0 });
     let ticks = player.status().fill;
-    player.handle(&HostMessage::Override { permille: 0, tick: ticks / 3 });
+    player.handle(&HostMessage::Override { permille: 0, tick: ticks / 3, number: 0 });
     assert_eq!(refusal(&mut player), None);
     let mut before = Setpoint::at_rest(100);
     for tick in 0..ticks / 3 + 2_000 {
@@ -40,7 +40,7 @@ fn a_hold_stands_on_the_path_and_what_follows_is_put_off() {
     assert!(fill > ticks / 4 && fill < ticks, "{fill}");
     // A table behind it waits as well.
     player.handle(&HostMessage::Start { table: 4, tick: 0 });
-    player.handle(&HostMessage::Override { permille: 1000, tick: player.status().tick + 5 });
+    player.handle(&HostMessage::Override { permille: 1000, tick: player.status().tick + 5, number: 0 });
     let end = player.status().tick + 5 + fill;
     let mut ticks = 0;
     while !before.done {
@@ -58,7 +58,7 @@ fn half_the_rate_is_half_the_velocity() {
     let (mut a, mut b) = ([0; 64], [0; 64]);
     let mut player = enabled(config(), &mut a, &mut b);
     // At rest the rate is what it is told to be, at once.
-    player.handle(&HostMessage::Override { permille: 500, tick: 0 });
+    player.handle(&HostMessage::Override { permille: 500, tick: 0, number: 0 });
     bring(&mut player, 4);
     player.handle(&HostMessage::Start { table: 4, tick: 0 });
     assert_eq!(refusal(&mut player), None);
@@ -79,7 +79,7 @@ fn half_the_rate_is_half_the_velocity() {
 fn rates_that_the_table_does_not_admit_are_refused() {
     let (mut a, mut b) = ([0; 64], [0; 64]);
     let mut player = enabled(config(), &mut a, &mut b);
-    player.handle(&HostMessage::Override { permille: 2001, tick: 0 });
+    player.handle(&HostMessage::Override { permille: 2001, tick: 0, number: 0 });
     assert_eq!(refusal(&mut player), Some(Reject::Override));
     bring(&mut player, 4);
     player.handle(&HostMessage::Start { table: 4, tick: 0 });
@@ -89,10 +89,10 @@ fn rates_that_the_table_does_not_admit_are_refused() {
     for (permille, tick, reason) in
         [(1001, 50, Reject::Override), (500, 9, Reject::Late { tick: 10 }), (2001, 50, Reject::Override)]
     {
-        player.handle(&HostMessage::Override { permille, tick });
+        player.handle(&HostMessage::Override { permille, tick, number: 0 });
         assert_eq!(refusal(&mut player), Some(reason));
     }
-    player.handle(&HostMessage::Override { permille: 1000, tick: 50 });
+    player.handle(&HostMessage::Override { permille: 1000, tick: 50, number: 0 });
     assert_eq!(refusal(&mut player), None);
 }
 
@@ -102,7 +102,7 @@ fn a_quick_stop_out_of_a_hold_stands_where_it_stands() {
     let mut player = enabled(config(), &mut a, &mut b);
     bring(&mut player, 4);
     player.handle(&HostMessage::Start { table: 4, tick: 0 });
-    player.handle(&HostMessage::Override { permille: 0, tick: 100 });
+    player.handle(&HostMessage::Override { permille: 0, tick: 100, number: 0 });
     let held = (0..2_000).map(|_| player.tick()).last().unwrap();
     assert_eq!(player.status().state, State::Held);
     player.handle(&HostMessage::QuickStop);
@@ -135,11 +135,11 @@ fn the_end_of_a_ramp_is_no_fault() {
         let excess = Excess { acceleration: 1e3, jerk: 1e3 };
         player.motion.set_guard(Guard::new(&AxisConfig { limits, excess, ..config() }));
         player.handle(&HostMessage::Start { table: 4, tick: 0 });
-        player.handle(&HostMessage::Override { permille: 900, tick });
+        player.handle(&HostMessage::Override { permille: 900, tick, number: 0 });
         (0..tick + 60).for_each(|_| {
             player.tick();
         });
-        player.handle(&HostMessage::Override { permille: 1000, tick: tick + 60 });
+        player.handle(&HostMessage::Override { permille: 1000, tick: tick + 60, number: 0 });
         while !player.tick().done {}
         assert_eq!((player.status().fault, player.status().position), (None, 8_100), "{tick}");
     }
@@ -168,8 +168,10 @@ fn a_table_without_bounds_keeps_to_rate_1() {
         let (mut a, mut b) = ([0; 64], [0; 64]);
         let mut player = enabled(config(), &mut a, &mut b);
         bring_warped(&mut player, 4, None);
-        let messages =
-            [HostMessage::Override { permille: 0, tick: 30 }, HostMessage::Start { table: 4, tick: 20 }];
+        let messages = [
+            HostMessage::Override { permille: 0, tick: 30, number: 0 },
+            HostMessage::Start { table: 4, tick: 20 },
+        ];
         let [first, second] = if change_first { [0, 1] } else { [1, 0] };
         player.handle(&messages[first]);
         assert_eq!(refusal(&mut player), None);

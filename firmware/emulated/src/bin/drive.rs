@@ -3,6 +3,7 @@
 #![no_main]
 
 use core::cell::Cell;
+use core::mem::MaybeUninit;
 
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::{entry, exception};
@@ -12,6 +13,7 @@ use emulated::uart::Uart;
 use firmware_core::axis::AxisConfig;
 use firmware_core::drive::DriveConfig;
 use firmware_core::halves::{Between, Move};
+use firmware_core::session::Watch;
 use protocol::bus::slcan::{self, LINE_BYTES, Line, Reader};
 use protocol::bus::{FrameSize, Node};
 use protocol::table::Limits;
@@ -20,6 +22,8 @@ use protocol::table::Limits;
 const TICK_NS: u32 = 1_000_000;
 /// Room for one table; there are two [bytes].
 const ROOM: usize = 64 * 1024;
+/// Between two beats [ticks].
+const STATUS_TICKS: u32 = 100;
 /// Address on the bus; the axis is the one before it.
 const NODE: u8 = match option_env!("FEEDSPLINE_NODE") {
     Some(digits) => match u8::from_str_radix(digits, 10) {
@@ -29,15 +33,20 @@ const NODE: u8 = match option_env!("FEEDSPLINE_NODE") {
     None => 1,
 };
 
+/// A number that every start-up finds one further: memory that no start-up clears, and that holds anything after power-up.
+#[unsafe(link_section = ".uninit.boot")]
+static mut BOOT: MaybeUninit<u32> = MaybeUninit::uninit();
+
 const CONFIG: DriveConfig = {
     let Some(node) = Node::new(NODE) else { panic!("FEEDSPLINE_NODE is a number from 1 to 127") };
     DriveConfig {
         node,
         frames: FrameSize::Classic,
         axis: AxisConfig {
-            status_ticks: 100,
+            status_ticks: STATUS_TICKS,
             ..AxisConfig::new(NODE - 1, TICK_NS, Limits { velocity: 1e9, acceleration: 1e11, jerk: None })
         },
+        watch: Watch::new(TICK_NS, STATUS_TICKS),
     }
 };
 
@@ -50,7 +59,10 @@ fn main() -> ! {
     static mut B: [u8; ROOM] = [0; ROOM];
     static mut BETWEEN: Between<'static> = Between::new();
     static mut PLACE: Option<Move<'static, 'static>> = None;
-    let (mut talk, moves) = BETWEEN.drive(CONFIG, A, B);
+    let mut config = CONFIG;
+    // SAFETY: nobody else names it, and any bits are a number.
+    config.watch.boot = unsafe { next_boot(&raw mut BOOT) };
+    let (mut talk, moves) = BETWEEN.drive(config, A, B);
     critical_section::with(|cs| MOVES.borrow(cs).set(Some(PLACE.insert(moves))));
     if let Some(core) = cortex_m::Peripherals::take() {
         let mut timer = core.SYST;
@@ -67,7 +79,7 @@ fn main() -> ! {
     loop {
         if let Some(line) = uart.read().and_then(|byte| reader.push(byte)) {
             match line {
-                Line::Frame(frame) => talk.receive(&frame),
+                Line::Frame(frame) => talk.receive(&frame, phase_ns()),
                 // Opening, closing and the bit rate of an adapter mean nothing here, and are granted.
                 Line::Command(_) => uart.write(b'\r'),
                 Line::Empty => {}
@@ -76,7 +88,29 @@ fn main() -> ! {
         }
         if let Some(frame) = talk.poll_transmit() {
             slcan::line(&frame, &mut text).iter().for_each(|byte| uart.write(*byte));
+            talk.sent(&frame, phase_ns());
         }
+    }
+}
+
+/// Since the present tick began [ns]. The emulated timer counts down at a fixed rate, which is not trimmed: what stamps are
+/// worth on this board is told by the emulator's own clock, not by a crystal.
+fn phase_ns() -> u32 {
+    let reload = CLOCK_HZ / 1_000_000 * (TICK_NS / 1_000) - 1;
+    reload.saturating_sub(cortex_m::peripheral::SYST::get_current()) * (1_000_000_000 / CLOCK_HZ)
+}
+
+/// One more than last time.
+///
+/// # Safety
+/// Nobody else uses the place meanwhile.
+unsafe fn next_boot(place: *mut MaybeUninit<u32>) -> u32 {
+    // SAFETY: the caller's; a volatile read makes some number of whatever the memory holds.
+    unsafe {
+        let place = place.cast::<u32>();
+        let boot = place.read_volatile().wrapping_add(1);
+        place.write_volatile(boot);
+        boot
     }
 }
 

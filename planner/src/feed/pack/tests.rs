@@ -90,25 +90,25 @@ fn what_the_format_cannot_express_is_refused_by_name() {
 }
 
 #[test]
-fn messages_carry_every_byte_in_order() {
-    use protocol::message::{HostMessage, Part};
-    let packed = packed();
-    let (mut opened, mut sealed, mut bytes) = (0, 0, Vec::new());
-    for message in packed.axis_messages(1) {
-        match message {
-            HostMessage::OpenAxis(header) => opened += u32::from(header == packed.axes[1].header),
-            HostMessage::Data { table: 7, part: Part::Axis, offset, bytes: piece } => {
-                assert_eq!(offset as usize, bytes.len());
-                bytes.extend(piece);
+fn frames_carry_every_byte() {
+    use protocol::bus::{FrameSize, Node, data};
+    let (packed, node) = (packed(), Node::new(9).unwrap());
+    for (size, units) in [(FrameSize::Classic, 1), (FrameSize::Fd, 12)] {
+        for axis in [None, Some(1)] {
+            let part = packed.part(axis);
+            let mut bytes = Vec::<u8>::new();
+            for k in 0.. {
+                let Some(frame) = packed.data_frame(axis, node, size, k * units) else { break };
+                let data = data::parse(frame.data()).unwrap();
+                assert_eq!((frame.id(), data.tag), (if axis.is_some() { 0x309 } else { 0x300 }, 7));
+                assert_eq!(data.unit as usize * data::UNIT, bytes.len());
+                bytes.extend(
+                    data.bytes.iter().take(units as usize * data::UNIT).take(part.len() - bytes.len()),
+                );
             }
-            HostMessage::Seal { table: 7, part: Part::Axis, crc } => {
-                sealed += u32::from(crc == packed.axes[1].crc());
-            }
-            other => panic!("{other:?}"),
+            assert_eq!(bytes, part);
         }
     }
-    assert_eq!((opened, sealed, bytes), (1, 1, packed.axes[1].controls.clone()));
-    assert_eq!(packed.axis_messages(2).count(), 0);
 }
 
 proptest! {

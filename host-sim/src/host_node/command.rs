@@ -1,0 +1,103 @@
+//! What the host has to say, and the frames of it.
+
+use planner::feed::messages::frames;
+use protocol::bus::stop::Stop;
+use protocol::bus::{Node, ids};
+use protocol::message::HostMessage;
+use protocol::power::PowerEvent;
+
+use super::upload::{Block, Upload};
+use super::{HostNode, Phase};
+use crate::bus::{Bus, Nanoseconds};
+
+/// Something to say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Command {
+    Identify,
+    /// To one drive, by its index.
+    Begin {
+        drive: usize,
+        boot: u32,
+        members: u128,
+        epoch: u16,
+    },
+    Alive,
+    Send(Block),
+    Start {
+        table: u32,
+        tick: u64,
+    },
+    /// What has not begun does not begin.
+    Cancel,
+    Stop(Stop),
+    Rate(Change),
+    /// To one drive, by its index.
+    Power(usize, PowerEvent),
+}
+
+/// A change of the rate of path time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Change {
+    pub(super) permille: u16,
+    pub(super) tick: u64,
+    pub(super) number: u8,
+    pub(super) repeat_at: u64,
+}
+
+impl HostNode<'_> {
+    /// Sends a command.
+    pub(super) fn send(&self, command: Command, bus: &mut dyn Bus, now: Nanoseconds) {
+        let mut epoch = self.greeting.epoch();
+        let to = |drive: usize| self.drives.get(drive).map_or(ids::BROADCAST, |link| link.address.to_drive());
+        let (id, message) = match command {
+            Command::Identify => (ids::BROADCAST, HostMessage::Identify),
+            Command::Begin { drive, boot, members, epoch: new } => {
+                epoch = new;
+                (to(drive), HostMessage::Begin { boot, members })
+            }
+            Command::Alive => (ids::BROADCAST, HostMessage::Alive),
+            Command::Send(block) => {
+                let (Phase::Uploading(upload) | Phase::Starting { upload, .. }) = &self.phase else { return };
+                return self.send_block(upload, block, bus, now);
+            }
+            Command::Start { table, tick } => (ids::BROADCAST, HostMessage::Start { table, tick }),
+            Command::Cancel => (ids::BROADCAST, HostMessage::Stop),
+            Command::Stop(stop) => {
+                if let Some(frame) = stop.frame() {
+                    bus.send(self.node, frame, now);
+                }
+                return;
+            }
+            Command::Rate(Change { permille, tick, number, .. }) => {
+                (ids::BROADCAST, HostMessage::Override { permille, tick, number })
+            }
+            Command::Power(drive, event) => (to(drive), HostMessage::Power(event)),
+        };
+        frames(id, self.frames, epoch, &message)
+            .into_iter()
+            .for_each(|frame| bus.send(self.node, frame, now));
+    }
+
+    fn send_block(&self, upload: &Upload<'_>, block: Block, bus: &mut dyn Bus, now: Nanoseconds) {
+        let node = |axis: Option<usize>| {
+            axis.and_then(|axis| self.drives.get(axis)).map(|link| link.address).or(Node::new(1))
+        };
+        if let Block::Data { axis, unit } = block {
+            let frame = node(axis).and_then(|to| upload.packed().data_frame(axis, to, self.frames, unit));
+            if let Some(frame) = frame {
+                bus.send(self.node, frame, now);
+            }
+            return;
+        }
+        let (axis, message) = upload.message(block);
+        let id = axis.and_then(node_of(&self.drives)).unwrap_or(ids::BROADCAST);
+        let epoch = self.greeting.epoch();
+        frames(id, self.frames, epoch, &message)
+            .into_iter()
+            .for_each(|frame| bus.send(self.node, frame, now));
+    }
+}
+
+fn node_of(drives: &[super::Link]) -> impl Fn(usize) -> Option<u16> + '_ {
+    |axis| drives.get(axis).map(|link| link.address.to_drive())
+}

@@ -1,0 +1,89 @@
+//! What the host knows of one drive.
+
+use protocol::bus::beat::Beat;
+use protocol::bus::{BLOCK_BYTES, Node, Reassembler};
+use protocol::message::{DriveMessage, Identity, State, Status, Telemetry, decode};
+
+/// What the host knows of one drive.
+#[derive(Debug)]
+pub struct Link {
+    pub(super) address: Node,
+    incoming: Reassembler<BLOCK_BYTES>,
+    beat: Option<Beat>,
+    status: Option<Status>,
+    telemetry: Option<Telemetry>,
+    pub(super) identity: Option<Identity>,
+}
+
+/// What a frame of a drive has said.
+#[derive(Debug)]
+pub(super) enum Heard {
+    Beat(Beat),
+    /// It has started up.
+    Boot,
+    Message(DriveMessage),
+}
+
+impl Link {
+    pub(super) fn new(address: Node) -> Self {
+        let incoming = Reassembler::new();
+        Self { address, incoming, beat: None, status: None, telemetry: None, identity: None }
+    }
+
+    /// Its address.
+    pub fn address(&self) -> Node {
+        self.address
+    }
+
+    /// Its last beat.
+    pub fn beat(&self) -> Option<&Beat> {
+        self.beat.as_ref()
+    }
+
+    /// Its last status.
+    pub fn status(&self) -> Option<&Status> {
+        self.status.as_ref()
+    }
+
+    /// How it has followed lately.
+    pub fn telemetry(&self) -> Option<&Telemetry> {
+        self.telemetry.as_ref()
+    }
+
+    /// Who it is.
+    pub fn identity(&self) -> Option<&Identity> {
+        self.identity.as_ref()
+    }
+
+    /// It stands still, with nothing to come.
+    pub(super) fn has_come_to_rest(&self) -> bool {
+        self.beat.is_some_and(|beat| matches!(beat.state, State::Holding | State::Idle) && beat.fill_ms == 0)
+    }
+
+    /// Takes in a frame, if it is one of this drive's.
+    pub(super) fn listen(&mut self, id: u16, data: &[u8]) -> Option<Heard> {
+        if id == self.address.beat() {
+            let beat = Beat::parse(data)?;
+            self.beat = Some(beat);
+            return Some(Heard::Beat(beat));
+        }
+        if id == self.address.heartbeat() && data == [0] {
+            // It has started up anew: what was known of it is no longer true.
+            (self.identity, self.beat, self.status) = (None, None, None);
+            return Some(Heard::Boot);
+        }
+        if id != self.address.from_drive() {
+            return None;
+        }
+        // A message with a lost frame is as good as none: silence is what the host acts on.
+        let Ok(Some((_, bytes))) = self.incoming.push(data) else { return None };
+        let message = decode::<DriveMessage>(bytes).ok()?;
+        match message {
+            DriveMessage::Status(status) => self.status = Some(status),
+            DriveMessage::Telemetry(telemetry) => self.telemetry = Some(telemetry),
+            DriveMessage::Identity(identity) => self.identity = Some(identity),
+            _ => {}
+        }
+        Some(Heard::Message(message))
+    }
+}
