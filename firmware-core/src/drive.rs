@@ -1,6 +1,5 @@
 //! A drive on the bus: its halves behind CAN frames.
 
-use heapless::Deque;
 use protocol::bus::beat::Beat;
 use protocol::bus::data;
 use protocol::bus::emergency::Emergency;
@@ -111,8 +110,8 @@ pub struct Station<'a> {
     session: Session,
     intake: Intake<'a>,
     tick_ns: u32,
-    /// Beats, and heartbeats as CANopen has them, that wait to be sent.
-    beats: Deque<Frame, 2>,
+    /// The beat that waits to be sent.
+    due: Option<Frame>,
     beat: u32,
     /// What the last status said of itself.
     shown: Option<Status>,
@@ -128,7 +127,7 @@ impl<'a> Station<'a> {
             session: Session::new(config.node, config.watch, tick_ns),
             intake: Intake::new(config.axis, a, b),
             tick_ns,
-            beats: Deque::new(),
+            due: None,
             beat: 0,
             shown: None,
             booted: false,
@@ -231,13 +230,7 @@ impl<'a> Station<'a> {
         self.session.look(status, now.tick);
         let intake = &self.intake;
         let held = Held { free: intake.free(), committed: intake.committed(), change: intake.change() };
-        let beat = self.session.beat_of(status, held, now, self.tick_ns);
-        if self.beats.is_full() {
-            self.beats.pop_front();
-        }
-        if let Some(beat) = beat {
-            let _ = self.beats.push_back(beat);
-        }
+        self.due = self.session.beat_of(status, held, now, self.tick_ns);
         let same = |shown: &Status| {
             (shown.state, shown.power, shown.fault) == (status.state, status.power, status.fault)
         };
@@ -246,12 +239,6 @@ impl<'a> Station<'a> {
         if slow || !self.shown.as_ref().is_some_and(same) {
             self.shown = Some(*status);
             self.intake.hear(Report::Status(*status));
-        }
-        if slow && !self.beats.is_full() {
-            let state = if self.session.is_open() { OPERATIONAL } else { PRE_OPERATIONAL };
-            if let Some(frame) = Frame::new(self.mail.node.heartbeat(), &[state]) {
-                let _ = self.beats.push_back(frame);
-            }
         }
     }
 
@@ -286,7 +273,7 @@ impl<'a> Station<'a> {
         if let Some(frame) = self.session.poll_transmit(now.tick) {
             return Some(frame);
         }
-        if let Some(frame) = self.beats.pop_front() {
+        if let Some(frame) = self.due.take() {
             return Some(frame);
         }
         loop {
@@ -313,10 +300,9 @@ impl<'a> Station<'a> {
     }
 }
 
-/// States of a CANopen heartbeat.
+/// The boot-up message of CANopen. Its heartbeats are not sent: at the lowest priority of all they would hold up the beats behind
+/// them for as long as table data keep the bus busy.
 const BOOTED: u8 = 0x00;
-const OPERATIONAL: u8 = 0x05;
-const PRE_OPERATIONAL: u8 = 0x7f;
 
 /// One drive in one piece: for hosts, where nothing interrupts anything.
 #[derive(Debug)]

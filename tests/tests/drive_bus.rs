@@ -9,9 +9,10 @@ use firmware_core::table::TableView;
 use planner::feed::messages::frames;
 use planner::feed::pack::Packed;
 use planner::feed::table::FeedTable;
+use protocol::bus::beat::Beat;
 use protocol::bus::{Frame, FrameSize, Node, Reassembler, ids};
 use protocol::message::{DriveMessage, HEADER_BYTES, HostMessage, Part, Reject, State, decode, encode};
-use protocol::power::PowerEvent;
+use protocol::power::{Power, PowerEvent};
 use protocol::table::{HeaderField, Limits, TableError, TableHeader};
 use tests::tables::{COARSE, Kind, Random, Sample, TICK_NS};
 
@@ -75,7 +76,9 @@ fn reason(drive: &mut Drive<'_>) -> Option<Reject> {
 }
 
 fn is_ready(drive: &mut Drive<'_>, number: u32) -> bool {
-    matches!(answers(drive)[..], [DriveMessage::Ready { table, .. }] if table == number)
+    let answers = answers(drive);
+    let ready = |m: &DriveMessage| matches!(m, DriveMessage::Ready { table, .. } if *table == number);
+    !answers.is_empty() && answers.iter().all(ready)
 }
 
 fn sample(seed: u64) -> (Sample, Packed) {
@@ -308,7 +311,7 @@ fn a_running_table_survives_stop_and_every_message_about_others() {
     let open = |table| HostMessage::Open(TableHeader { table, ..packed.header });
     for (tick, setpoint) in expected.iter().enumerate() {
         match tick % 4 {
-            1 => send(&mut drive, ids::STOP, &HostMessage::Stop),
+            1 => send(&mut drive, ids::BROADCAST, &HostMessage::Stop),
             2 => send(&mut drive, ids::BROADCAST, &open(1)),
             3 => send(&mut drive, ids::BROADCAST, &open(2)),
             _ if tick > 0 => {
@@ -322,21 +325,34 @@ fn a_running_table_survives_stop_and_every_message_about_others() {
 }
 
 #[test]
-fn status_comes_at_its_period() {
+fn beats_come_at_their_period_and_a_status_with_every_tenth_or_change() {
     let (_, packed) = sample(43);
     let (mut a, mut b) = ([0; 4096], [0; 4096]);
     let mut config = config(0, start_of(&packed));
     config.axis.status_ticks = 20;
     let mut drive = enabled(config, &mut a, &mut b);
-    let statuses: Vec<_> = (0..100)
-        .flat_map(|_| {
-            drive.tick();
-            answers(&mut drive)
-        })
-        .collect();
-    assert_eq!(statuses.len(), 5);
-    let DriveMessage::Status(first) = statuses[0] else { panic!() };
-    assert_eq!((first.state, first.tick, first.position), (State::Idle, 20, start_of(&packed)));
+    let (mut beats, mut statuses) = (Vec::new(), Vec::new());
+    let mut receiver = Reassembler::<96>::new();
+    for tick in 0..400 {
+        if tick == 250 {
+            send(&mut drive, ids::BROADCAST, &HostMessage::Power(PowerEvent::DisableOperation));
+        }
+        drive.tick();
+        while let Some(frame) = drive.poll_transmit() {
+            if Node::of_beat(frame.id()).is_some() {
+                beats.push(Beat::parse(frame.data()).unwrap());
+            } else if Node::of_answer(frame.id()).is_some()
+                && let Some((1, bytes)) = receiver.push(frame.data()).unwrap()
+                && let DriveMessage::Status(status) = decode(bytes).unwrap()
+            {
+                statuses.push((tick, status.tick, status.power));
+            }
+        }
+    }
+    assert_eq!(beats.len(), 20);
+    assert_eq!((beats[0].state, beats[0].open, beats[0].synced, beats[0].free), (State::Idle, true, true, 2));
+    let (on, off) = (Power::OperationEnabled, Power::SwitchedOn);
+    assert_eq!(statuses, [(19, 20, on), (219, 220, on), (259, 260, off)]);
 }
 
 /// A header with one bit of its bytes changed, if that is a header.

@@ -16,7 +16,7 @@
 //! | 280 + n | drive n | all | beat: what every other node has to know | [`beat`](super::beat) |
 //! | 300 | host | all | bytes of a shared part | [`data`](super::data) |
 //! | 300 + n | host | drive n | bytes of an axis part | [`data`](super::data) |
-//! | 700 + n | drive n | all | heartbeat of CANopen | one byte |
+//! | 700 + n | drive n | all | boot-up message of CANopen | one byte, 0 |
 
 /// NMT of CANopen.
 pub const NMT: u16 = 0x000;
@@ -81,7 +81,7 @@ impl Node {
         EMERGENCY + self.0 as u16
     }
 
-    /// Identifier of this drive's heartbeat.
+    /// Identifier of this drive's boot-up message.
     pub const fn heartbeat(self) -> u16 {
         HEARTBEAT + self.0 as u16
     }
