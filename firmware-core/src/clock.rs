@@ -9,7 +9,7 @@
 use protocol::bus::sync::{Stamp, Time, nearest};
 
 /// Measurements after which the clock may count as one with the master's.
-const ENOUGH: u32 = 8;
+const ENOUGH: u32 = 16;
 /// Least share of a new measurement in the offset, and in the rate.
 const LEAST: [f32; 2] = [0.2, 0.02];
 /// Largest trim [1].
@@ -20,7 +20,9 @@ const GRACE_NS: f32 = 2_000.0;
 /// But so many in a row are.
 const PERSISTENT: u8 = 5;
 /// Offset below which the clock counts as one with the master's [ns].
-const AGREED_NS: f32 = 2_000.0;
+const AGREED_NS: f32 = 1_000.0;
+/// Offset above which nothing fine is learned [ns].
+const COARSE_NS: f32 = 10_000.0;
 /// Time without a SYNC after which it does not any more [ns].
 const STALE_NS: u64 = 3_000_000_000;
 /// Assumed between the first two measurements [ns].
@@ -47,6 +49,8 @@ pub struct Clock {
     noise: f32,
     rejected: u8,
     outliers: u32,
+    /// A large offset is being led away: by steep trims, whose exact beginning and end nobody knows.
+    coarse: bool,
 }
 
 impl Clock {
@@ -64,6 +68,7 @@ impl Clock {
             noise: 0.0,
             rejected: 0,
             outliers: 0,
+            coarse: false,
         }
     }
 
@@ -105,7 +110,8 @@ impl Clock {
 
     /// Whether the own count is one with the master's.
     pub fn agrees(&self, now: Stamp) -> bool {
-        self.count >= ENOUGH
+        !self.coarse
+            && self.count >= ENOUGH
             && self.offset.abs() < AGREED_NS
             && self.own(now).saturating_sub(self.last) < STALE_NS
     }
@@ -139,6 +145,12 @@ impl Clock {
             }
             // It is the filter that is wrong; the rate of a crystal is not.
             (self.count, self.noise) = (0, 0.0);
+        }
+        if self.count == 0 {
+            self.coarse = behind.abs() > COARSE_NS;
+        } else if self.coarse && behind.abs() < COARSE_NS {
+            // Only what is learned from now on is worth remembering.
+            (self.coarse, self.count, self.noise) = (false, 0, 0.0);
         }
         self.rejected = 0;
         self.last = at;

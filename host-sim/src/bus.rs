@@ -1,15 +1,18 @@
 //! The wire between host and drives, in virtual time.
 //!
 //! [`Bus`] is the seam: nodes attach, send and receive; nothing else is known of the medium. [`InProcessBus`] is
-//! the deterministic medium, and decorators change it: [`Lossy`] drops frames, [`Recorder`] writes a candump log.
+//! the deterministic medium, and decorators change it: [`Lossy`] drops frames, [`Meddler`] loses, doubles and delays
+//! them as it is told, [`Recorder`] writes a candump log.
 
 mod in_process;
 mod lossy;
+mod meddler;
 mod recorder;
 mod timing;
 
 pub use in_process::InProcessBus;
 pub use lossy::Lossy;
+pub use meddler::{Fate, Meddler};
 pub use protocol::bus::{Frame, FrameSize};
 pub use recorder::Recorder;
 pub use timing::BitTiming;

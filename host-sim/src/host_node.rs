@@ -150,6 +150,8 @@ pub struct HostNode<'a> {
     change: Option<Change>,
     changes: u8,
     stopped: bool,
+    /// A tick of the drives' count, and when it was told.
+    reading: Option<(u64, Nanoseconds)>,
     counters: HostCounters,
 }
 
@@ -189,8 +191,28 @@ impl<'a> HostNode<'a> {
             change: None,
             changes: 0,
             stopped: false,
+            reading: None,
             counters: HostCounters::default(),
         }
+    }
+
+    /// One turn of a host that knows of the drives' count what they tell: a tick of it is some ticks old.
+    ///
+    /// # Errors
+    /// When a drive refuses, fails or is silent for good.
+    pub fn turn(&mut self, bus: &mut dyn Bus, now: Nanoseconds) -> Result<(), HostError> {
+        if let Some(status) = self.drives.first_mut().and_then(Link::take_fresh_status) {
+            self.reading = Some((status.tick, now));
+        }
+        let tick = self.tick_at(now);
+        self.tick(bus, tick, now)
+    }
+
+    /// The tick of the drives' common count, as far as the host knows.
+    pub fn tick_at(&self, now: Nanoseconds) -> u64 {
+        let tick_ns = u64::from(self.orders.first().map_or(1_000_000, |o| o.packed.header.tick_ns));
+        let (tick, then) = self.reading.unwrap_or_default();
+        tick + now.saturating_sub(then) / tick_ns.max(1)
     }
 
     /// One turn, at tick `tick` of the drives' common count.

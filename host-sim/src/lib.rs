@@ -4,7 +4,7 @@
 //! time to one [`drive_node`] per axis, which runs the very core that drives run; behind each set-point an
 //! [`axis_loop`] closes [`encoder`], [`servo`] and [`plant`]. Meanwhile [`recording`] compares set-points with the
 //! plan ([`planner::analysis::motion`]), hashes them, feeds the [`trace`] and gathers the [`statistics`] of the
-//! [`report`]. Everything runs in one thread and in one order: two runs are the same to the bit.
+//! [`report`]. A [`fleet`] has a clock for every drive instead, for what goes wrong between them. Everything runs in one thread and in one order: two runs are the same to the bit.
 
 pub mod axis_loop;
 pub mod axis_scale;
@@ -12,6 +12,7 @@ pub mod bus;
 pub mod drive_node;
 pub mod emulator;
 pub mod encoder;
+pub mod fleet;
 pub mod group;
 pub mod host_node;
 pub mod plant;

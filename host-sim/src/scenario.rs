@@ -18,13 +18,43 @@ use protocol::table::rules::MAX_FRACTION_BITS;
 use crate::axis_loop::CountSetpoint;
 use crate::bus::{Bus, InProcessBus, Lossy, Traffic};
 use crate::drive_node::{Buffers, DriveNode};
-use crate::host_node::{HostCounters, HostNode, Order, Run};
+use crate::host_node::{HostCounters, HostNode, HostTiming, Order, Run};
 use crate::recording::Recording;
 use crate::report::{BusReport, SimReport};
 use crate::trace::TraceSink;
 
 /// How many ticks pass between two calls of the progress function.
 const PROGRESS_TICKS: u64 = 4096;
+
+/// A job's tables in order, with the drives that can play them and the size of their buffers.
+#[derive(Clone, Debug)]
+pub struct Cast {
+    /// The tables.
+    pub orders: Vec<Order>,
+    /// One per axis, at the addresses from 1.
+    pub drives: Vec<DriveConfig>,
+    /// Bytes of each of a drive's two buffers.
+    pub buffer_bytes: usize,
+    /// How a host deals with time.
+    pub timing: HostTiming,
+}
+
+impl Cast {
+    /// What it takes to play `job` on a machine.
+    ///
+    /// # Errors
+    /// When the job does not fit the machine.
+    pub fn new(job: &[JobItem], machine: &Machine, settings: &SimSettings) -> Result<Self, SimError> {
+        let plan = Programme::new(job, machine, settings)?;
+        let drives = (0..machine.axes.len()).map(|axis| plan.drive(axis, settings));
+        Ok(Self {
+            drives: drives.collect::<Result<_, _>>()?,
+            buffer_bytes: plan.buffer_bytes,
+            timing: settings.host_timing(plan.tick_s, machine.axes.len()),
+            orders: plan.orders,
+        })
+    }
+}
 
 /// Plays `job` on a bus of its own, with the losses of `settings`.
 ///

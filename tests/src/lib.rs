@@ -2,6 +2,7 @@
 
 pub mod chain;
 pub mod drives;
+pub mod fleet;
 pub mod judge;
 pub mod meander;
 pub mod oracle;

@@ -11,6 +11,8 @@ pub struct Link {
     incoming: Reassembler<BLOCK_BYTES>,
     beat: Option<Beat>,
     status: Option<Status>,
+    /// It has not been looked at.
+    fresh: bool,
     telemetry: Option<Telemetry>,
     pub(super) identity: Option<Identity>,
 }
@@ -27,7 +29,7 @@ pub(super) enum Heard {
 impl Link {
     pub(super) fn new(address: Node) -> Self {
         let incoming = Reassembler::new();
-        Self { address, incoming, beat: None, status: None, telemetry: None, identity: None }
+        Self { address, incoming, beat: None, status: None, fresh: false, telemetry: None, identity: None }
     }
 
     /// Its address.
@@ -43,6 +45,11 @@ impl Link {
     /// Its last status.
     pub fn status(&self) -> Option<&Status> {
         self.status.as_ref()
+    }
+
+    /// Its last status, if that has come since the last call.
+    pub(super) fn take_fresh_status(&mut self) -> Option<Status> {
+        if core::mem::take(&mut self.fresh) { self.status } else { None }
     }
 
     /// How it has followed lately.
@@ -79,7 +86,7 @@ impl Link {
         let Ok(Some((_, bytes))) = self.incoming.push(data) else { return None };
         let message = decode::<DriveMessage>(bytes).ok()?;
         match message {
-            DriveMessage::Status(status) => self.status = Some(status),
+            DriveMessage::Status(status) => (self.status, self.fresh) = (Some(status), true),
             DriveMessage::Telemetry(telemetry) => self.telemetry = Some(telemetry),
             DriveMessage::Identity(identity) => self.identity = Some(identity),
             _ => {}

@@ -7,9 +7,9 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 use crate::shell::Step;
 
 /// Most bytes of flash that the drive's image may take: what was measured, and a twentieth more.
-const MOST_FLASH: u64 = 83_000;
+const MOST_FLASH: u64 = 98_000;
 /// Most bytes of RAM beside the two table buffers and the stack.
-const MOST_RAM: u64 = 4_870;
+const MOST_RAM: u64 = 5_200;
 /// The two table buffers of the drive's image.
 const BUFFERS: u64 = 2 * 64 * 1024;
 
