@@ -156,16 +156,16 @@ impl Record {
 
     /// By tick, the largest difference of the instants so far [ns].
     pub fn skews(&self) -> Vec<u64> {
-        self.ticks.iter().map(spread).collect()
+        self.ticks.iter().map(|row| spread(row)).collect()
     }
 
     /// The largest difference between the instants at which drives have given the set-points of one tick [ns].
     pub fn skew(&self) -> u64 {
-        self.ticks.iter().map(spread).max().unwrap_or(0)
+        self.ticks.iter().map(|row| spread(row)).max().unwrap_or(0)
     }
 }
 
-fn spread(row: &Vec<Option<(i64, u64, bool)>>) -> u64 {
+fn spread(row: &[Option<(i64, u64, bool)>]) -> u64 {
     let times: Option<Vec<u64>> = row.iter().map(|cell| cell.map(|c| c.1)).collect();
     times.map_or(0, |t| t.iter().max().unwrap() - t.iter().min().unwrap())
 }
