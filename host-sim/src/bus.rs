@@ -1,15 +1,19 @@
 //! The wire between host and drives, in virtual time.
 //!
 //! [`Bus`] is the seam: nodes attach, send and receive; nothing else is known of the medium. [`InProcessBus`] is
-//! the deterministic medium, and decorators change it: [`Lossy`] drops frames, [`Meddler`] loses, doubles and delays
-//! them as it is told, [`Recorder`] writes a candump log.
+//! the deterministic medium on which nothing goes wrong, [`CanBus`] one that errs as CAN does. Decorators change them:
+//! [`Lossy`] drops frames, [`Meddler`] loses, doubles and delays them as it is told, [`Recorder`] writes a candump log.
 
+mod bits;
+pub mod can;
 mod in_process;
 mod lossy;
 mod meddler;
 mod recorder;
 mod timing;
 
+pub use bits::{Stuffing, WireBits};
+pub use can::CanBus;
 pub use in_process::InProcessBus;
 pub use lossy::Lossy;
 pub use meddler::{Fate, Meddler};
@@ -51,6 +55,11 @@ pub trait Bus {
 
     /// Queues a frame for sending at `now`, which never runs backwards.
     fn send(&mut self, node: NodeIndex, frame: Frame, now: Nanoseconds);
+
+    /// Whether a frame more would find room; without it [`Bus::send`] loses the frame.
+    fn has_room(&self, _node: NodeIndex) -> bool {
+        true
+    }
 
     /// Lets all frames cross that end until `until`.
     fn advance(&mut self, until: Nanoseconds);

@@ -39,7 +39,9 @@ impl<'m> DriveNode<'m> {
         }
         let s = self.drive.tick();
         self.began = now;
-        while let Some(frame) = self.drive.poll_transmit() {
+        while bus.has_room(self.node)
+            && let Some(frame) = self.drive.poll_transmit()
+        {
             bus.send(self.node, frame, now);
         }
         let setpoint =

@@ -117,6 +117,22 @@ impl<'m> Fleet<'m> {
         self.host = None;
     }
 
+    /// Another host takes over, which is on the bus already.
+    pub fn replace_host(&mut self, host: HostNode<'m>) {
+        self.host = Some(host);
+        self.host_next = self.now as f64;
+    }
+
+    /// A drive starts up anew, in the place of the one before it on the bus: its count begins at 0.
+    pub fn restart(&mut self, axis: usize, config: &DriveConfig, [a, b]: &'m mut Buffers) {
+        self.members[axis].drive = Drive::new(*config, a, b);
+    }
+
+    /// Where a drive is on the bus.
+    pub fn node(&self, axis: usize) -> NodeIndex {
+        self.members[axis].node
+    }
+
     /// A drive.
     pub fn drive(&self, axis: usize) -> &Drive<'m> {
         &self.members[axis].drive
@@ -167,7 +183,10 @@ impl<'m> Fleet<'m> {
             member.drive.receive(&received.frame, since(received.time));
         }
         let setpoint = member.drive.tick();
-        while let Some(frame) = member.drive.poll_transmit() {
+        // What does not fit the interface stays in the drive, which has something newer to say by then.
+        while bus.has_room(member.node)
+            && let Some(frame) = member.drive.poll_transmit()
+        {
             bus.send(member.node, frame, self.now);
         }
         let trim = f64::from(member.drive.trim_ppb()) * 1e-9;

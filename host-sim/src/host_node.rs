@@ -15,7 +15,7 @@ use std::collections::VecDeque;
 
 use planner::feed::pack::Packed;
 use protocol::bus::stop::Stop;
-use protocol::bus::{FrameSize, Node};
+use protocol::bus::{Frame, FrameSize, Node};
 use protocol::message::{DriveMessage, Fault, Reject, Status};
 use protocol::power::{Power, PowerEvent};
 
@@ -142,6 +142,8 @@ pub struct HostNode<'a> {
     next: usize,
     phase: Phase<'a>,
     outbox: VecDeque<Command>,
+    /// Frames of commands that did not fit the interface's queue.
+    pending: VecDeque<Frame>,
     runs: VecDeque<Run>,
     lead_growth: u32,
     /// When drives without torque are told again to enable operation.
@@ -184,6 +186,7 @@ impl<'a> HostNode<'a> {
             next: 0,
             phase: Phase::Idle,
             outbox: VecDeque::new(),
+            pending: VecDeque::new(),
             runs: VecDeque::new(),
             lead_growth: 0,
             enable_at: 0,
@@ -223,13 +226,29 @@ impl<'a> HostNode<'a> {
         while let Some(received) = bus.receive(self.node) {
             self.listen(received.frame.id(), received.frame.data())?;
         }
-        let sent = self.outbox.is_empty() && bus.waiting(self.node) == 0;
+        let sent = self.outbox.is_empty() && self.pending.is_empty() && bus.waiting(self.node) == 0;
         self.decide(tick, sent)?;
-        while bus.waiting(self.node) < QUEUED_FRAMES {
-            let Some(command) = self.outbox.pop_front() else { break };
-            self.send(command, bus, now);
-        }
+        self.transmit(bus, now);
         Ok(())
+    }
+
+    /// Hands frames to the interface, as many as fit its queue.
+    fn transmit(&mut self, bus: &mut dyn Bus, now: Nanoseconds) {
+        while bus.waiting(self.node) < QUEUED_FRAMES && bus.has_room(self.node) {
+            if let Some(frame) = self.pending.pop_front() {
+                bus.send(self.node, frame, now);
+            } else if let Some(command) = self.outbox.pop_front() {
+                let frames = self.frames_of(command);
+                self.pending.extend(frames);
+            } else {
+                break;
+            }
+        }
+    }
+
+    /// Where the host is on the bus.
+    pub fn node(&self) -> NodeIndex {
+        self.node
     }
 
     /// The table that plays at `tick`, if any.
@@ -274,6 +293,7 @@ impl<'a> HostNode<'a> {
     /// Stops all drives; the epoch ends.
     pub fn stop(&mut self, stop: Stop) {
         self.outbox.clear();
+        self.pending.clear();
         self.outbox.extend([Command::Stop(stop); STOP_COPIES]);
         self.phase = Phase::Idle;
         self.next = self.orders.len();
@@ -335,6 +355,7 @@ impl<'a> HostNode<'a> {
 
     fn begin_anew(&mut self) {
         self.outbox.clear();
+        self.pending.clear();
         self.greeting.close();
         self.change = None;
         if let Phase::Uploading(upload) | Phase::Starting { upload, .. } = &mut self.phase {

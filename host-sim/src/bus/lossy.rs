@@ -33,6 +33,10 @@ impl<B: Bus> Bus for Lossy<B> {
         self.inner.send(node, frame, now);
     }
 
+    fn has_room(&self, node: NodeIndex) -> bool {
+        self.inner.has_room(node)
+    }
+
     fn advance(&mut self, until: Nanoseconds) {
         self.inner.advance(until);
     }

@@ -56,6 +56,10 @@ impl<B: Bus, F: FnMut(NodeIndex, &Received) -> Fate> Bus for Meddler<B, F> {
         self.inner.send(node, frame, now);
     }
 
+    fn has_room(&self, node: NodeIndex) -> bool {
+        self.inner.has_room(node)
+    }
+
     fn advance(&mut self, until: Nanoseconds) {
         self.now = until;
         self.inner.advance(until);

@@ -59,6 +59,10 @@ impl<B: Bus, W: Write> Bus for Recorder<B, W> {
         self.inner.send(node, frame, now);
     }
 
+    fn has_room(&self, node: NodeIndex) -> bool {
+        self.inner.has_room(node)
+    }
+
     fn advance(&mut self, until: Nanoseconds) {
         self.inner.advance(until);
         while let Some(received) = self.inner.receive(self.tap) {

@@ -53,11 +53,11 @@ impl BitTiming {
         }
     }
 
-    fn nominal_time(&self, bits: u64) -> Nanoseconds {
+    pub(super) fn nominal_time(&self, bits: u64) -> Nanoseconds {
         (bits * 1_000_000_000).div_ceil(u64::from(self.nominal.max(1)))
     }
 
-    fn data_time(&self, bits: u64) -> Nanoseconds {
+    pub(super) fn data_time(&self, bits: u64) -> Nanoseconds {
         (bits * 1_000_000_000).div_ceil(u64::from(self.data.max(1)))
     }
 }

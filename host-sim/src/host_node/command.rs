@@ -2,13 +2,12 @@
 
 use planner::feed::messages::frames;
 use protocol::bus::stop::Stop;
-use protocol::bus::{Node, ids};
+use protocol::bus::{Frame, Node, ids};
 use protocol::message::HostMessage;
 use protocol::power::PowerEvent;
 
 use super::upload::{Block, Upload};
 use super::{HostNode, Phase};
-use crate::bus::{Bus, Nanoseconds};
 
 /// Something to say.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,8 +44,8 @@ pub(super) struct Change {
 }
 
 impl HostNode<'_> {
-    /// Sends a command.
-    pub(super) fn send(&self, command: Command, bus: &mut dyn Bus, now: Nanoseconds) {
+    /// The frames of a command.
+    pub(super) fn frames_of(&self, command: Command) -> Vec<Frame> {
         let mut epoch = self.greeting.epoch();
         let to = |drive: usize| self.drives.get(drive).map_or(ids::BROADCAST, |link| link.address.to_drive());
         let (id, message) = match command {
@@ -57,44 +56,34 @@ impl HostNode<'_> {
             }
             Command::Alive => (ids::BROADCAST, HostMessage::Alive),
             Command::Send(block) => {
-                let (Phase::Uploading(upload) | Phase::Starting { upload, .. }) = &self.phase else { return };
-                return self.send_block(upload, block, bus, now);
+                let (Phase::Uploading(upload) | Phase::Starting { upload, .. }) = &self.phase else {
+                    return Vec::new();
+                };
+                return self.frames_of_block(upload, block);
             }
             Command::Start { table, tick } => (ids::BROADCAST, HostMessage::Start { table, tick }),
             Command::Cancel => (ids::BROADCAST, HostMessage::Stop),
-            Command::Stop(stop) => {
-                if let Some(frame) = stop.frame() {
-                    bus.send(self.node, frame, now);
-                }
-                return;
-            }
+            Command::Stop(stop) => return stop.frame().into_iter().collect(),
             Command::Rate(Change { permille, tick, number, .. }) => {
                 (ids::BROADCAST, HostMessage::Override { permille, tick, number })
             }
             Command::Power(drive, event) => (to(drive), HostMessage::Power(event)),
         };
         frames(id, self.frames, epoch, &message)
-            .into_iter()
-            .for_each(|frame| bus.send(self.node, frame, now));
     }
 
-    fn send_block(&self, upload: &Upload<'_>, block: Block, bus: &mut dyn Bus, now: Nanoseconds) {
+    fn frames_of_block(&self, upload: &Upload<'_>, block: Block) -> Vec<Frame> {
         let node = |axis: Option<usize>| {
             axis.and_then(|axis| self.drives.get(axis)).map(|link| link.address).or(Node::new(1))
         };
         if let Block::Data { axis, unit } = block {
             let frame = node(axis).and_then(|to| upload.packed().data_frame(axis, to, self.frames, unit));
-            if let Some(frame) = frame {
-                bus.send(self.node, frame, now);
-            }
-            return;
+            return frame.into_iter().collect();
         }
         let (axis, message) = upload.message(block);
         let id = axis.and_then(node_of(&self.drives)).unwrap_or(ids::BROADCAST);
         let epoch = self.greeting.epoch();
         frames(id, self.frames, epoch, &message)
-            .into_iter()
-            .for_each(|frame| bus.send(self.node, frame, now));
     }
 }
 
