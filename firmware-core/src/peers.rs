@@ -64,9 +64,15 @@ impl Peers {
         }
     }
 
-    /// One of them was not heard for too long; those that never were do not count.
-    pub(crate) fn silent(&self, now: u64, ticks: u32) -> bool {
-        self.all.iter().any(|peer| peer.heard != 0 && (now as u32).wrapping_sub(peer.heard) > ticks)
+    /// Ticks since the one that was not heard for longest was heard, if that is too long; those that never were do not count.
+    pub(crate) fn silent(&self, now: u64, ticks: u32) -> Option<u32> {
+        let ages = self.all.iter().filter(|peer| peer.heard != 0);
+        ages.map(|peer| (now as u32).wrapping_sub(peer.heard)).filter(|age| *age > ticks).max()
+    }
+
+    /// There are none.
+    pub(crate) fn is_alone(&self) -> bool {
+        self.all.is_empty()
     }
 
     /// While this drive plays a table, one of them does not. To be asked once per beat of this drive.

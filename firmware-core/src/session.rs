@@ -108,6 +108,8 @@ pub(crate) struct Session {
     /// Tick of the host's last word.
     host: u64,
     peers: Peers,
+    /// Tick at which a beat of this drive has left it last: what the others have heard of it. 0: never.
+    own: u64,
     /// The tick from which on everybody stops.
     stop: Option<u64>,
     hold: Option<u64>,
@@ -137,6 +139,7 @@ impl Session {
             master: false,
             host: 0,
             peers: Peers::new(),
+            own: 0,
             stop: None,
             hold: None,
             cancel: false,
@@ -302,13 +305,29 @@ impl Session {
         let running = matches!(status.state, State::Running | State::Held);
         if self.watch.drive_ticks > 0
             && (running || status.state == State::Armed)
-            && self.peers.silent(now, self.watch.drive_ticks)
+            && let Some(age) = self.silence(now)
         {
-            return self.stop_at(self.common(now), Cause::DriveSilent, true);
+            return self.stop_at(self.after_silence(now, age), Cause::DriveSilent, true);
         }
         if self.peers.astray(running) {
             self.stop_at(self.common(now), Cause::DriveAstray, true);
         }
+    }
+
+    /// Ticks since another drive was heard last, or this one by the others, if that is too long.
+    fn silence(&self, now: u64) -> Option<u32> {
+        let ticks = self.watch.drive_ticks;
+        let unheard = u32::try_from(now.saturating_sub(self.own)).unwrap_or(u32::MAX);
+        let own = (self.own != 0 && !self.peers.is_alone() && unheard > ticks).then_some(unheard);
+        self.peers.silent(now, ticks).max(own)
+    }
+
+    /// A tick for a stop that both sides of a broken line find by themselves: it hangs on the last frame that has crossed, not
+    /// on when somebody has missed the next one.
+    fn after_silence(&self, now: u64, age: u32) -> u64 {
+        let lead = u64::from(self.watch.lead_ticks.max(1));
+        let noticed = now.saturating_sub(u64::from(age)).saturating_add(u64::from(self.watch.drive_ticks));
+        (noticed / lead).saturating_add(3).saturating_mul(lead).max(now.saturating_add(1))
     }
 
     fn is_lost(&self, now: u64) -> bool {
@@ -360,6 +379,9 @@ impl Session {
     pub(crate) fn shifted(&mut self, ticks: i64) {
         self.clock.jumped();
         self.host = self.host.saturating_add_signed(ticks);
+        if self.own != 0 {
+            self.own = self.own.saturating_add_signed(ticks).max(1);
+        }
         self.peers.shift(ticks);
     }
 
@@ -384,6 +406,9 @@ impl Session {
 
     /// A frame of this drive has left it.
     pub(crate) fn sent(&mut self, frame: &Frame, at: Stamp) {
+        if frame.id() == self.node.beat() {
+            self.own = at.tick;
+        }
         if let (true, ids::SYNC, [counter, ..]) = (self.master, frame.id(), frame.data()) {
             self.time = Time::new(*counter, at);
         }

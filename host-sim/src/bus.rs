@@ -21,6 +21,9 @@ pub use protocol::bus::{Frame, FrameSize};
 pub use recorder::Recorder;
 pub use timing::BitTiming;
 
+/// Transmit events that a controller keeps.
+const EVENTS: usize = 32;
+
 /// Virtual time since the simulation began [ns].
 pub type Nanoseconds = u64;
 
@@ -67,7 +70,8 @@ pub trait Bus {
     /// The oldest frame that has reached `node` and has not been taken yet.
     fn receive(&mut self, node: NodeIndex) -> Option<Received>;
 
-    /// The last frame of `node` that has crossed, once: what a controller's transmit event tells.
+    /// The oldest frame of `node` that has crossed and was not asked for: what a controller's transmit events tell. Old ones are
+    /// lost when nobody asks.
     fn sent(&mut self, node: NodeIndex) -> Option<Received>;
 
     /// Frames of `node` still waiting to be sent.

@@ -113,6 +113,12 @@ pub enum HostError {
         /// In what.
         mismatch: Mismatch,
     },
+    /// Somebody else has told the drives to stop: nothing goes on by itself.
+    #[error("axis {axis} was told to stop by somebody else")]
+    Told {
+        /// Which axis, or the first one of all.
+        axis: usize,
+    },
     /// The drives have stopped on their path.
     #[error("axis {axis} has ended its epoch: the drives stop on their path")]
     Stopped {
@@ -223,13 +229,23 @@ impl<'a> HostNode<'a> {
     /// # Errors
     /// When a drive refuses, fails or is silent for good.
     pub fn tick(&mut self, bus: &mut dyn Bus, tick: u64, now: Nanoseconds) -> Result<(), HostError> {
+        let result = self.take_turn(bus, tick);
+        if result.is_err() && !core::mem::replace(&mut self.stopped, true) {
+            // What some drives hold already, they must not begin without the others.
+            self.outbox.clear();
+            self.pending.clear();
+            self.outbox.extend([Command::Cancel; STOP_COPIES]);
+        }
+        self.transmit(bus, now);
+        result
+    }
+
+    fn take_turn(&mut self, bus: &mut dyn Bus, tick: u64) -> Result<(), HostError> {
         while let Some(received) = bus.receive(self.node) {
-            self.listen(received.frame.id(), received.frame.data())?;
+            self.listen(&received.frame)?;
         }
         let sent = self.outbox.is_empty() && self.pending.is_empty() && bus.waiting(self.node) == 0;
-        self.decide(tick, sent)?;
-        self.transmit(bus, now);
-        Ok(())
+        self.decide(tick, sent)
     }
 
     /// Hands frames to the interface, as many as fit its queue.
@@ -300,7 +316,11 @@ impl<'a> HostNode<'a> {
         self.stopped = true;
     }
 
-    fn listen(&mut self, id: u16, data: &[u8]) -> Result<(), HostError> {
+    fn listen(&mut self, frame: &Frame) -> Result<(), HostError> {
+        let (id, data) = (frame.id(), frame.data());
+        if let Some(axis) = self.drives.iter().position(|link| link.is_told_to_stop(frame)) {
+            return if self.stopped { Ok(()) } else { Err(HostError::Told { axis }) };
+        }
         let epoch = self.greeting.epoch();
         let heard = self
             .drives
@@ -348,6 +368,9 @@ impl<'a> HostNode<'a> {
         }
         if !self.runs.is_empty() {
             return Err(HostError::Stopped { axis });
+        }
+        if self.drives[axis].beat().is_some_and(|beat| beat.power == Power::QuickStopActive) {
+            return Err(HostError::Told { axis });
         }
         self.begin_anew();
         Ok(())

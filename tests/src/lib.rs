@@ -6,4 +6,5 @@ pub mod fleet;
 pub mod judge;
 pub mod meander;
 pub mod oracle;
+pub mod scene;
 pub mod tables;

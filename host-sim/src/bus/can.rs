@@ -16,7 +16,7 @@ pub use source::Source;
 
 use controller::Station;
 
-use super::{BitTiming, Bus, Frame, FrameSize, Nanoseconds, NodeIndex, Received, Stuffing, Traffic};
+use super::{BitTiming, Bus, EVENTS, Frame, FrameSize, Nanoseconds, NodeIndex, Received, Stuffing, Traffic};
 
 /// Frames of a source that may wait; what finds no room is overwritten.
 const MAILBOXES: usize = 8;
@@ -273,7 +273,10 @@ impl CanBus {
             match ending {
                 Ending::Crossed if sends => {
                     node.sending.pop_front();
-                    node.sent = Some(Received { time: end, frame });
+                    if node.sent.len() == EVENTS {
+                        node.sent.pop_front();
+                    }
+                    node.sent.push_back(Received { time: end, frame });
                     node.counters.transmitted();
                     node.history.sent += 1;
                 }
@@ -335,7 +338,7 @@ impl Bus for CanBus {
     }
 
     fn sent(&mut self, node: NodeIndex) -> Option<Received> {
-        self.nodes[node.0].sent.take()
+        self.nodes[node.0].sent.pop_front()
     }
 
     fn waiting(&self, node: NodeIndex) -> usize {

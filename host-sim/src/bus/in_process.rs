@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{BitTiming, Bus, Frame, Nanoseconds, NodeIndex, Received, Traffic};
+use super::{BitTiming, Bus, EVENTS, Frame, Nanoseconds, NodeIndex, Received, Traffic};
 
 /// A bus that loses nothing and is the same on every run.
 ///
@@ -20,7 +20,7 @@ pub struct InProcessBus {
 struct Node {
     sending: VecDeque<(Nanoseconds, Frame)>,
     received: VecDeque<Received>,
-    sent: Option<Received>,
+    sent: VecDeque<Received>,
 }
 
 impl InProcessBus {
@@ -66,7 +66,10 @@ impl Bus for InProcessBus {
             for (i, node) in self.nodes.iter_mut().enumerate() {
                 if i == sender {
                     node.sending.pop_front();
-                    node.sent = Some(Received { time: end, frame });
+                    if node.sent.len() == EVENTS {
+                        node.sent.pop_front();
+                    }
+                    node.sent.push_back(Received { time: end, frame });
                 } else {
                     node.received.push_back(Received { time: end, frame });
                 }
@@ -79,7 +82,7 @@ impl Bus for InProcessBus {
     }
 
     fn sent(&mut self, node: NodeIndex) -> Option<Received> {
-        self.nodes[node.0].sent.take()
+        self.nodes[node.0].sent.pop_front()
     }
 
     fn waiting(&self, node: NodeIndex) -> usize {

@@ -1,7 +1,9 @@
 //! What the host knows of one drive.
 
 use protocol::bus::beat::Beat;
-use protocol::bus::{BLOCK_BYTES, Node, Reassembler};
+use protocol::bus::emergency::{Cause, Emergency, STOP_CODE};
+use protocol::bus::stop::Stop;
+use protocol::bus::{BLOCK_BYTES, Frame, Node, Reassembler};
 use protocol::message::{DriveMessage, Identity, State, Status, Telemetry, decode};
 
 /// What the host knows of one drive.
@@ -65,6 +67,15 @@ impl Link {
     /// It stands still, with nothing to come.
     pub(super) fn has_come_to_rest(&self) -> bool {
         self.beat.is_some_and(|beat| matches!(beat.state, State::Holding | State::Idle) && beat.fill_ms == 0)
+    }
+
+    /// Somebody stops this drive, or it passes on that somebody has.
+    pub(super) fn is_told_to_stop(&self, frame: &Frame) -> bool {
+        let announced = || {
+            let emergency = Emergency::parse(frame.data()).filter(|_| frame.id() == self.address.emergency());
+            emergency.is_some_and(|e| e.code == STOP_CODE && e.cause == Cause::Told)
+        };
+        Stop::of(frame, self.address.number()).is_some() || announced()
     }
 
     /// Takes in a frame, if it is one of this drive's.

@@ -88,7 +88,7 @@ pub(super) struct Station {
     pub(super) wire: usize,
     pub(super) sending: VecDeque<(Nanoseconds, Frame)>,
     pub(super) received: VecDeque<Received>,
-    pub(super) sent: Option<Received>,
+    pub(super) sent: VecDeque<Received>,
     /// It sends nothing before.
     pub(super) ready: Nanoseconds,
     /// Off the bus and on its way back: since when it counts, and how many sequences are left.
@@ -105,7 +105,7 @@ impl Station {
             wire: 0,
             sending: VecDeque::new(),
             received: VecDeque::new(),
-            sent: None,
+            sent: VecDeque::new(),
             ready: 0,
             returning: None,
             source,
