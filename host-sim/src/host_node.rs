@@ -230,14 +230,26 @@ impl<'a> HostNode<'a> {
     /// When a drive refuses, fails or is silent for good.
     pub fn tick(&mut self, bus: &mut dyn Bus, tick: u64, now: Nanoseconds) -> Result<(), HostError> {
         let result = self.take_turn(bus, tick);
-        if result.is_err() && !core::mem::replace(&mut self.stopped, true) {
-            // What some drives hold already, they must not begin without the others.
-            self.outbox.clear();
-            self.pending.clear();
-            self.outbox.extend([Command::Cancel; STOP_COPIES]);
+        if let Err(error) = &result
+            && !core::mem::replace(&mut self.stopped, true)
+        {
+            self.give_up(error);
         }
         self.transmit(bus, now);
         result
+    }
+
+    /// What some drives hold already they must not begin without the others, and what moves must not go on without one of them.
+    fn give_up(&mut self, error: &HostError) {
+        self.outbox.clear();
+        self.pending.clear();
+        let refused = matches!(error, HostError::Rejected { .. } | HostError::Disagree { .. });
+        let last = if refused || self.runs.is_empty() {
+            Command::Cancel
+        } else {
+            Command::Stop(Stop::Path { tick: None })
+        };
+        self.outbox.extend([last; STOP_COPIES]);
     }
 
     fn take_turn(&mut self, bus: &mut dyn Bus, tick: u64) -> Result<(), HostError> {

@@ -49,6 +49,8 @@ impl<'m> Scene<'m> {
     pub fn on(job: &'m Job, buffers: &'m mut [Buffers], timing: BitTiming) -> Self {
         let mut bus = CanBus::new(timing, Stuffing::Exact, 17);
         let somebody = bus.attach();
+        // Its frames may have the identifiers of others.
+        bus.controller(somebody).one_shot = true;
         let mut fleet =
             job.fleet(buffers, FleetSettings { host_jitter: 50_000, ..FleetSettings::default() }, &mut bus);
         let host = fleet.host().unwrap().node();

@@ -151,7 +151,9 @@ impl<'a> Motion<'a> {
         self.refuse_to_stray()?;
         let AxisConfig { mut limits, tick_ns, travel, .. } = self.config;
         let slower = velocity.unwrap_or(limits.velocity);
-        let sensible = slower > 0.0 && travel.is_none_or(|[low, high]| (low..=high).contains(&position));
+        let sensible = slower > 0.0
+            && slower.is_finite()
+            && travel.is_none_or(|[low, high]| (low..=high).contains(&position));
         if !sensible {
             return Err(Reject::Target);
         }

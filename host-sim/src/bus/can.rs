@@ -291,7 +291,11 @@ impl CanBus {
                     } else {
                         node.counters.transmit_failed()
                     }
-                    node.history.retried += 1;
+                    if node.settings.one_shot {
+                        node.sending.pop_front();
+                    } else {
+                        node.history.retried += 1;
+                    }
                 }
                 Ending::Destroyed { .. } if node.settings.listen_only => {}
                 Ending::Destroyed { .. } => node.counters.receive_failed(misread.contains(&i)),

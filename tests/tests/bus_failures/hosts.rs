@@ -2,7 +2,9 @@
 
 use host_sim::bus::{BitTiming, Bus};
 use host_sim::host_node::{HostError, Mismatch, Order};
-use protocol::message::{Reject, State};
+use planner::feed::messages::frames;
+use protocol::bus::{FrameSize, ids};
+use protocol::message::{HostMessage, Reject, State};
 use protocol::table::TableError;
 use tests::fleet::Job;
 use tests::scene::Scene;
@@ -79,7 +81,8 @@ fn the_host_crashes_at_the_start() {
 fn one_axis_rejects() {
     let mut job = Job::short(BitTiming::default());
     // The checksum is right, the declared limits are not kept.
-    job.cast.orders[0].packed.axes[1].header.limits.acceleration *= 0.5;
+    job.cast.orders[0].packed.header.warp = None;
+    job.cast.orders[0].packed.axes[1].header.limits.acceleration *= 0.05;
     let mut buffers = job.buffers();
     let mut scene = Scene::new(&job, &mut buffers);
     scene.until("an error", |scene| scene.error.is_some());
@@ -95,12 +98,13 @@ fn one_axis_rejects() {
 fn a_table_with_a_right_checksum_breaks_its_limits() {
     for which in 0..3 {
         let mut job = Job::short(BitTiming::default());
+        job.cast.orders[0].packed.header.warp = None;
         for axis in &mut job.cast.orders[0].packed.axes {
             let limits = &mut axis.header.limits;
             match which {
-                0 => limits.velocity *= 0.3,
-                1 => limits.acceleration *= 0.3,
-                _ => limits.jerk = limits.jerk.map(|jerk| 0.3 * jerk),
+                0 => limits.velocity *= 0.05,
+                1 => limits.acceleration *= 0.05,
+                _ => limits.jerk = limits.jerk.map(|jerk| 0.05 * jerk),
             }
         }
         let mut buffers = job.buffers();
@@ -140,7 +144,7 @@ fn a_drive_resets_in_motion() {
         let (mut buffers, mut spare) = (job.buffers(), job.buffers());
         let mut scene = Scene::new(&job, &mut buffers);
         scene.until_moving();
-        scene.pass(100);
+        scene.pass(20);
         let mut config = job.cast.drives[axis];
         config.watch.boot += 100;
         config.axis.position = scene.statuses()[axis].position;
@@ -151,7 +155,8 @@ fn a_drive_resets_in_motion() {
         assert_eq!(scene.statuses()[axis].position, stood, "the drive that has started up moves");
         assert!(matches!(scene.error, Some(HostError::Stopped { .. })), "{:?}", scene.error);
         let others = (0..3).filter(|other| *other != axis);
-        assert!(others.map(|other| scene.statuses()[other].state).all(|state| state == State::Held));
+        let states: Vec<_> = others.map(|other| scene.statuses()[other]).collect();
+        assert!(states.iter().all(|status| status.state == State::Held), "{axis}: {states:?}");
     }
 }
 
@@ -237,14 +242,23 @@ fn starts_are_replayed() {
     let mut buffers = job.buffers();
     let mut scene = Scene::new(&job, &mut buffers);
     scene.until_moving();
-    // In motion, and when it is over.
-    for _ in 0..2 {
-        for frame in scene.words_of_the_host() {
-            scene.say(frame);
-        }
-        scene.assert_comes_to_rest(1_200);
-        scene.assert_played_to_the_end();
+    let (epoch, now) = (scene.fleet.drive(0).epoch().0, scene.statuses()[0].tick);
+    // In motion, to the tick of the start and to others.
+    for tick in [now - 1, now, now + 1, now + 50, now + 10_000, 0] {
+        let start = HostMessage::Start { table: 0, tick };
+        frames(ids::BROADCAST, FrameSize::Classic, epoch, &start)
+            .into_iter()
+            .for_each(|frame| scene.say(frame));
+        scene.pass(10);
     }
+    scene.assert_comes_to_rest(1_200);
+    scene.assert_played_to_the_end();
+    // When it is over, with everything that led to it.
+    for frame in scene.words_of_the_host() {
+        scene.say(frame);
+    }
+    scene.assert_comes_to_rest(1_200);
+    scene.assert_played_to_the_end();
     scene.assert_on_path(&job.path());
     // And when the host has gone.
     crash(&mut scene);

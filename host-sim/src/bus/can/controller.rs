@@ -27,6 +27,8 @@ pub struct Controller {
     pub send_depth: usize,
     /// Received frames that may wait to be taken; the newest is lost when there are more.
     pub receive_depth: usize,
+    /// A frame that was destroyed is not sent again.
+    pub one_shot: bool,
     /// Takes part in nothing but reading: no acknowledgement, no error flags.
     pub listen_only: bool,
     /// Probability that a frame of its own is garbled on its way out.
@@ -42,6 +44,7 @@ impl Default for Controller {
             recovery: Recovery::Automatic,
             send_depth: usize::MAX,
             receive_depth: usize::MAX,
+            one_shot: false,
             listen_only: false,
             garbles: 0.0,
             misreads: 0.0,

@@ -169,6 +169,18 @@ fn a_frame_that_nobody_acknowledges_was_not_sent() {
 }
 
 #[test]
+fn a_one_shot_is_not_repeated() {
+    let mut bus = bus();
+    let [a, b, c] = three(&mut bus);
+    bus.controller(a).one_shot = true;
+    bus.send(a, Frame::new(0x77, &[1]).unwrap(), 0);
+    bus.send(b, Frame::new(0x77, &[2]).unwrap(), 0);
+    bus.advance(MS);
+    assert_eq!((bus.history(a).sent, bus.history(b).sent, bus.destroyed()), (0, 1, 1));
+    assert_eq!(bus.receive(c).map(|r| r.frame.data().to_vec()), Some(vec![2]));
+}
+
+#[test]
 fn listeners_do_not_acknowledge() {
     let mut bus = bus();
     let [a, b] = [bus.attach(), bus.attach()];
