@@ -3,6 +3,7 @@
 pub mod chain;
 pub mod drives;
 pub mod fleet;
+pub mod fuzzing;
 pub mod judge;
 pub mod meander;
 pub mod oracle;

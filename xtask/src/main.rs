@@ -1,6 +1,7 @@
 //! One front door for building, checking and measuring: `cargo xtask <word>`.
 
 mod firmware;
+mod fuzz;
 mod names;
 mod peers;
 mod real;
@@ -69,6 +70,12 @@ enum Word {
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
+    /// Feed everything that reads bytes of others with bytes that nobody would send
+    Fuzz {
+        /// For how long, each target [s]
+        #[arg(long, default_value_t = 60)]
+        seconds: u64,
+    },
     /// Run the release binary over a folder of part programs and print a table
     Real {
         /// The folder; sub-folders are searched, .gz files are unpacked with gzip
@@ -97,6 +104,7 @@ fn main() -> ExitCode {
         Word::Names => names::check(&root),
         Word::RandomPaths { count, seed, from } => random_paths(&root, count, seed, from),
         Word::DoubleS { count, seed } => double_s(&root, count, seed),
+        Word::Fuzz { seconds } => fuzz::run(&root, seconds),
         Word::Real { dir, machine } => real::table(&root, &dir, machine.as_deref()),
     };
     match result {
