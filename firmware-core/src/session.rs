@@ -296,13 +296,14 @@ impl Session {
             }
             return;
         }
-        if !self.open {
+        let running = matches!(status.state, State::Running | State::Held);
+        // What was called off in motion ends the epoch, and yet nobody goes on to the end without the others.
+        if !self.open && (!running || self.stop.is_some()) {
             return;
         }
-        if self.is_lost(now) {
+        if self.open && self.is_lost(now) {
             return self.stop_at(self.common(now), Cause::HostSilent, self.moving);
         }
-        let running = matches!(status.state, State::Running | State::Held);
         if self.watch.drive_ticks > 0
             && (running || status.state == State::Armed)
             && let Some(age) = self.silence(now)

@@ -270,3 +270,36 @@ fn starts_are_replayed() {
     scene.assert_played_to_the_end();
     assert!(scene.bus.traffic().frames > 1_000);
 }
+
+/// What follows is called off, which ends the epoch: what plays goes on to its end, but not without one of the drives.
+#[test]
+fn a_drive_is_lost_after_the_host_has_called_off_what_follows() {
+    let job = Job::short(BitTiming::default());
+    for lost in [false, true] {
+        let mut buffers = job.buffers();
+        let mut scene = Scene::new(&job, &mut buffers);
+        scene.until_moving();
+        crash(&mut scene);
+        let epoch = scene.fleet.drive(0).epoch().0;
+        let words = frames(ids::BROADCAST, FrameSize::Classic, epoch, &HostMessage::Stop);
+        words.into_iter().for_each(|frame| scene.say(frame));
+        scene.pass(10);
+        assert_all_closed(&scene);
+        let (node, now) = (scene.drive_node(1), scene.fleet.now());
+        if lost {
+            scene.bus.cut(node, now);
+        }
+        scene.assert_comes_to_rest(1_000);
+        scene.assert_on_path(&job.path());
+        scene.assert_no_fault();
+        if lost {
+            assert!(
+                scene.statuses().iter().all(|status| status.state == State::Held),
+                "{:?}",
+                scene.statuses()
+            );
+        } else {
+            scene.assert_played_to_the_end();
+        }
+    }
+}

@@ -109,3 +109,23 @@ fn blocks_that_are_cut_wrongly() {
     scene.assert_never_moves(400);
     scene.assert_no_fault();
 }
+
+/// Both buffers are taken, whatever the sender counts: a third table is refused, and what is held is not touched.
+#[test]
+fn a_third_table_is_refused() {
+    let job = Job::short(BitTiming::default());
+    let mut buffers = job.buffers();
+    let mut scene = Scene::new(&job, &mut buffers);
+    scene.until_moving();
+    let epoch = scene.fleet.drive(0).epoch().0;
+    let header = job.cast.orders[0].packed.header;
+    // One plays; each of these takes the other buffer, or the same number again.
+    for table in [5, 6, 7, 0, 8] {
+        to_all(&mut scene, epoch, &HostMessage::Open(protocol::table::TableHeader { table, ..header }));
+        to_all(&mut scene, epoch, &HostMessage::Start { table, tick: 0 });
+        scene.pass(12);
+    }
+    scene.assert_comes_to_rest(1_000);
+    scene.assert_played_to_the_end();
+    scene.assert_on_path(&job.path());
+}
