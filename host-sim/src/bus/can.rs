@@ -9,14 +9,16 @@
 mod controller;
 mod counters;
 mod source;
+mod wire;
 
 pub use controller::{Controller, History, Recovery};
 pub use counters::{ErrorCounters, ErrorState};
 pub use source::Source;
 
 use controller::Station;
+use wire::{Ending, Transmission};
 
-use super::{BitTiming, Bus, EVENTS, Frame, FrameSize, Nanoseconds, NodeIndex, Received, Stuffing, Traffic};
+use super::{BitTiming, Bus, EVENTS, Frame, Nanoseconds, NodeIndex, Received, Stuffing, Traffic};
 
 /// Frames of a source that may wait; what finds no room is overwritten.
 const MAILBOXES: usize = 8;
@@ -52,31 +54,6 @@ pub struct CanBus {
     noise: Vec<Noise>,
     traffic: Traffic,
     destroyed: u64,
-}
-
-/// How a frame ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Ending {
-    Crossed,
-    /// By these bits of it.
-    Destroyed {
-        /// Nobody has acknowledged it.
-        alone: bool,
-        /// How much of it was on the wire [1/1024].
-        part: u64,
-    },
-}
-
-/// A frame on the wire.
-#[derive(Clone, Debug)]
-struct Transmission {
-    senders: Vec<usize>,
-    start: Nanoseconds,
-    frame: Frame,
-    ending: Ending,
-    end: Nanoseconds,
-    /// Receivers that have misread it.
-    misread: Vec<usize>,
 }
 
 impl CanBus {
@@ -162,13 +139,6 @@ impl CanBus {
         self.timing.nominal_time(count)
     }
 
-    /// A number in [0, 1) of its own for each seed, time, node and question.
-    fn chance(&self, time: Nanoseconds, node: usize, question: u64) -> f64 {
-        let mixed =
-            self.seed ^ time.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (node as u64) << 48 ^ question << 40;
-        fastrand::Rng::with_seed(mixed.wrapping_mul(0xbf58_476d_1ce4_e5b9)).f64()
-    }
-
     /// Whoever hangs on a piece of wire and is not off the bus.
     fn present(&self, wire: usize) -> impl Iterator<Item = (usize, &Station)> {
         self.nodes.iter().enumerate().filter(move |(_, node)| node.wire == wire && !node.is_off())
@@ -190,49 +160,6 @@ impl CanBus {
                 }
             }
         }
-    }
-
-    /// What is on a piece of wire next.
-    fn next(&self, wire: usize) -> Option<Transmission> {
-        let heads =
-            || self.present(wire).filter_map(|(i, node)| node.head().map(|(at, frame)| (i, at, frame)));
-        let start = heads().map(|(_, at, _)| at).min()?.max(self.wires[wire]);
-        let contenders = || heads().filter(|&(_, at, _)| at <= start);
-        let (first, _, frame) = contenders().min_by_key(|(i, _, frame)| (frame.id(), *i))?;
-        let alike = || contenders().filter(|(_, _, other)| other.id() == frame.id());
-        let senders: Vec<usize> = alike().map(|(i, ..)| i).collect();
-        let differ = alike().any(|(_, _, other)| other != frame);
-        let format = |i: usize| self.nodes[i].settings.format.unwrap_or(self.timing.format);
-        let mut misread = Vec::new();
-        let (mut acknowledged, mut flagged) = (senders.len() > 1, differ);
-        for (i, node) in self.present(wire).filter(|(i, _)| !senders.contains(i)) {
-            let wrong = format(i) == FrameSize::Classic && format(first) == FrameSize::Fd;
-            let fails = wrong || self.hits(node.settings.misreads, start, i, 1);
-            if fails {
-                misread.push(i);
-                flagged |= node.flags();
-            } else {
-                acknowledged |= !node.settings.listen_only;
-            }
-        }
-        let garbled = senders.iter().any(|&i| self.hits(self.nodes[i].settings.garbles, start, i, 2));
-        let noisy = self.noise.iter().filter(|noise| (noise.from..noise.until).contains(&start));
-        let hit = noisy.enumerate().any(|(k, noise)| self.hits(noise.share, start, k, 3));
-        let took = BitTiming { format: format(first), ..self.timing }.time(&frame, self.stuffing);
-        let (ending, end) = if hit || garbled || flagged {
-            let part = 200 + (self.chance(start, first, 4) * 700.0) as u64;
-            (Ending::Destroyed { alone: false, part }, took * part / 1024 + self.bits(ALL_FLAGS_BITS))
-        } else if !acknowledged {
-            // All of it but the end of frame and what follows.
-            (Ending::Destroyed { alone: true, part: 1024 }, took - self.bits(11) + self.bits(OWN_FLAG_BITS))
-        } else {
-            (Ending::Crossed, took)
-        };
-        Some(Transmission { senders, start, frame, ending, end: start + end, misread })
-    }
-
-    fn hits(&self, share: f64, time: Nanoseconds, node: usize, question: u64) -> bool {
-        share > 0.0 && self.chance(time, node, question) < share
     }
 
     /// The node that is back on the bus first, if nothing is sent before.
@@ -285,7 +212,7 @@ impl CanBus {
                     node.history.misread += 1;
                 }
                 Ending::Crossed => node.take(Received { time: end, frame }),
-                Ending::Destroyed { alone, .. } if sends => {
+                Ending::Destroyed { alone } if sends => {
                     if alone {
                         node.counters.unacknowledged()
                     } else {
