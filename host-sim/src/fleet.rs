@@ -74,7 +74,7 @@ struct Member<'m> {
 #[derive(Debug)]
 pub struct Fleet<'m> {
     members: Vec<Member<'m>>,
-    host: Option<HostNode<'m>>,
+    host: Option<HostNode>,
     host_next: f64,
     settings: FleetSettings,
     random: fastrand::Rng,
@@ -86,7 +86,7 @@ impl<'m> Fleet<'m> {
     pub fn new(
         configs: &[DriveConfig],
         buffers: &'m mut [Buffers],
-        host: HostNode<'m>,
+        host: HostNode,
         settings: FleetSettings,
         bus: &mut dyn Bus,
     ) -> Self {
@@ -108,7 +108,7 @@ impl<'m> Fleet<'m> {
     }
 
     /// The host, while it lives.
-    pub fn host(&mut self) -> Option<&mut HostNode<'m>> {
+    pub fn host(&mut self) -> Option<&mut HostNode> {
         self.host.as_mut()
     }
 

@@ -60,7 +60,9 @@ impl Job {
         bus: &mut dyn Bus,
     ) -> Fleet<'m> {
         let (axes, frames) = (self.cast.drives.len() as u8, self.cast.drives[0].frames);
-        let host = HostNode::new(&self.cast.orders, axes, frames, self.cast.timing, bus);
+        let mut host = HostNode::new(axes, frames, self.cast.timing, bus);
+        self.cast.orders.iter().cloned().for_each(|order| host.push(order));
+        host.close();
         Fleet::new(&self.cast.drives, buffers, host, settings, bus)
     }
 

@@ -33,6 +33,8 @@ pub(super) enum Command {
     Rate(Change),
     /// To one drive, by its index.
     Power(usize, PowerEvent),
+    /// To one drive, by its index.
+    Tell(usize, HostMessage<'static>),
 }
 
 /// A change of the rate of path time.
@@ -44,7 +46,7 @@ pub(super) struct Change {
     pub(super) repeat_at: u64,
 }
 
-impl HostNode<'_> {
+impl HostNode {
     /// Sends a command.
     pub(super) fn send(&self, command: Command, bus: &mut dyn Bus, now: Nanoseconds) {
         let mut epoch = self.greeting.epoch();
@@ -72,13 +74,14 @@ impl HostNode<'_> {
                 (ids::BROADCAST, HostMessage::Override { permille, tick, number })
             }
             Command::Power(drive, event) => (to(drive), HostMessage::Power(event)),
+            Command::Tell(drive, message) => (to(drive), message),
         };
         frames(id, self.frames, epoch, &message)
             .into_iter()
             .for_each(|frame| bus.send(self.node, frame, now));
     }
 
-    fn send_block(&self, upload: &Upload<'_>, block: Block, bus: &mut dyn Bus, now: Nanoseconds) {
+    fn send_block(&self, upload: &Upload, block: Block, bus: &mut dyn Bus, now: Nanoseconds) {
         let node = |axis: Option<usize>| {
             axis.and_then(|axis| self.drives.get(axis)).map(|link| link.address).or(Node::new(1))
         };
