@@ -7,6 +7,7 @@
 mod in_process;
 mod lossy;
 mod meddler;
+pub mod real;
 mod recorder;
 mod timing;
 

@@ -24,7 +24,8 @@ use crate::bus::{Bus, Nanoseconds, NodeIndex};
 use command::{Change, Command};
 use greeting::Greeting;
 pub use greeting::Mismatch;
-use link::{Heard, Link};
+use link::Heard;
+pub use link::Link;
 use upload::Upload;
 
 /// Frames the host keeps in its interface's queue, so that the wire never waits for the host.
@@ -159,6 +160,7 @@ pub struct HostNode {
     /// When motion ends is known to the drives only: it was put together of pieces, or its rate has been changed.
     loose: bool,
     stopped: bool,
+    refusal: Option<Reject>,
     /// A tick of the drives' count, and when it was told.
     reading: Option<(u64, Nanoseconds)>,
     counters: HostCounters,
@@ -198,6 +200,7 @@ impl HostNode {
             changes: 0,
             loose: false,
             stopped: false,
+            refusal: None,
             reading: None,
             counters: HostCounters::default(),
         }
@@ -292,6 +295,12 @@ impl HostNode {
         self.next
     }
 
+    /// The axes are on a motion of which a piece is still to be confirmed.
+    pub fn has_more_of_the_motion(&self) -> bool {
+        let joins = self.order(self.next).is_some_and(|order| order.packed.header.joint.is_some());
+        joins && !self.is_at_rest()
+    }
+
     /// What every drive has told last, in the order of the axes.
     pub fn drives(&self) -> impl Iterator<Item = &Link> {
         self.drives.iter()
@@ -312,6 +321,16 @@ impl HostNode {
     /// All drives follow set-points, in step with each other, and may be told to move.
     pub fn is_ready(&self) -> bool {
         self.greeting.is_open() && self.all_enabled()
+    }
+
+    /// The control tick of the drives, where no table tells it.
+    pub fn set_tick_ns(&mut self, tick_ns: u32) {
+        self.tick_ns = tick_ns.max(1);
+    }
+
+    /// Why a drive has refused what it was told last, if it has.
+    pub fn refusal(&self) -> Option<Reject> {
+        self.refusal
     }
 
     /// Tells one drive something, inside the open epoch.
@@ -374,7 +393,14 @@ impl HostNode {
             _ => {}
         }
         match &mut self.phase {
-            Phase::Idle => Ok(()),
+            Phase::Idle => {
+                if let DriveMessage::Reject { reason, .. } = message
+                    && !refused_without_torque(&message)
+                {
+                    self.refusal = Some(reason);
+                }
+                Ok(())
+            }
             // Commands on the way to torque may get lost and are repeated; what is refused then is no loss.
             Phase::Uploading(_) if refused_without_torque(&message) => Ok(()),
             Phase::Uploading(upload) | Phase::Starting { upload, .. } => upload.answered(axis, &message),
@@ -413,7 +439,8 @@ impl HostNode {
             if sent {
                 let needs = self.order(self.next).cloned();
                 let needs = needs.as_ref().map(|order| &order.packed);
-                let commands = self.greeting.proceed(&mut self.drives, needs, tick, self.timing.answer)?;
+                let commands =
+                    self.greeting.proceed(&mut self.drives, needs, self.tick_ns, tick, self.timing.answer)?;
                 self.outbox.extend(commands);
             }
             return Ok(());
