@@ -11,6 +11,8 @@ pub mod real;
 mod recorder;
 mod timing;
 
+use std::collections::VecDeque;
+
 pub use in_process::InProcessBus;
 pub use lossy::Lossy;
 pub use meddler::{Fate, Meddler};
@@ -20,6 +22,17 @@ pub use timing::BitTiming;
 
 /// Virtual time since the simulation began [ns].
 pub type Nanoseconds = u64;
+
+/// Transmit events that a controller keeps, the newest.
+pub const TRANSMIT_EVENTS: usize = 32;
+
+/// Keeps one transmit event.
+fn keep_event(events: &mut VecDeque<Received>, event: Received) {
+    if events.len() >= TRANSMIT_EVENTS {
+        events.pop_front();
+    }
+    events.push_back(event);
+}
 
 /// A participant of the bus, in the order of attaching.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -59,7 +72,8 @@ pub trait Bus {
     /// The oldest frame that has reached `node` and has not been taken yet.
     fn receive(&mut self, node: NodeIndex) -> Option<Received>;
 
-    /// The last frame of `node` that has crossed, once: what a controller's transmit event tells.
+    /// The oldest frame of `node` that has crossed and was not told yet, as a controller's transmit events tell it. Events
+    /// that nobody takes are lost after [`TRANSMIT_EVENTS`].
     fn sent(&mut self, node: NodeIndex) -> Option<Received>;
 
     /// Frames of `node` still waiting to be sent.

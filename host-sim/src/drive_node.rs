@@ -31,7 +31,7 @@ impl<'m> DriveNode<'m> {
     pub fn tick(&mut self, bus: &mut dyn Bus, now: Nanoseconds) -> (CountSetpoint, bool) {
         let began = self.began;
         let since = |time: Nanoseconds| u32::try_from(time.saturating_sub(began)).unwrap_or(u32::MAX);
-        if let Some(sent) = bus.sent(self.node) {
+        while let Some(sent) = bus.sent(self.node) {
             self.drive.sent(&sent.frame, since(sent.time));
         }
         while let Some(received) = bus.receive(self.node) {

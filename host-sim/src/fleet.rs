@@ -159,7 +159,7 @@ impl<'m> Fleet<'m> {
             let passed = (time as f64 - began).max(0.0) + random.f64() * late;
             (passed * speed) as u32
         };
-        if let Some(sent) = bus.sent(member.node) {
+        while let Some(sent) = bus.sent(member.node) {
             member.drive.sent(&sent.frame, since(sent.time));
         }
         while let Some(received) = bus.receive(member.node) {

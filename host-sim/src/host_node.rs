@@ -15,6 +15,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use planner::feed::pack::Packed;
+use protocol::bus::beat::Beat;
 use protocol::bus::stop::Stop;
 use protocol::bus::{FrameSize, Node};
 use protocol::message::{DriveMessage, Fault, HostMessage, Reject, Status};
@@ -34,6 +35,8 @@ const QUEUED_FRAMES: usize = 48;
 const STOP_COPIES: usize = 3;
 /// Rounds without progress after which a drive counts as silent.
 const MAX_ROUNDS: u32 = 40;
+/// How long a drive with its table may take until it is ready to move [ns].
+const UNREADY_NS: u64 = 60_000_000_000;
 /// How much the time between command and start may grow after starts that were called off.
 const MAX_LEAD_GROWTH: u32 = 6;
 
@@ -115,6 +118,14 @@ pub enum HostError {
         /// In what.
         mismatch: Mismatch,
     },
+    /// A drive does not get ready to move.
+    #[error("axis {axis} is not ready to move: {}", unready(beat.as_ref()))]
+    Unready {
+        /// Which axis.
+        axis: usize,
+        /// What it has said last.
+        beat: Option<Beat>,
+    },
     /// The drives have stopped on their path.
     #[error("axis {axis} has ended its epoch: the drives stop on their path")]
     Stopped {
@@ -155,6 +166,8 @@ pub struct HostNode {
     /// When drives without torque are told again to enable operation.
     enable_at: u64,
     alive_at: u64,
+    /// Since when drives that hold a table are waited for.
+    unready_since: Option<u64>,
     change: Option<Change>,
     changes: u8,
     /// When motion ends is known to the drives only: it was put together of pieces, or its rate has been changed.
@@ -196,6 +209,7 @@ impl HostNode {
             lead_growth: 0,
             enable_at: 0,
             alive_at: 0,
+            unready_since: None,
             change: None,
             changes: 0,
             loose: false,
@@ -502,10 +516,15 @@ impl HostNode {
 
     /// All drives follow set-points, in step with each other.
     fn all_enabled(&self) -> bool {
+        self.unready().is_none()
+    }
+
+    /// The first drive that does not follow set-points in step with the others.
+    fn unready(&self) -> Option<usize> {
         let epoch = self.greeting.epoch() as u8;
-        self.drives.iter().all(|link| {
-            link.beat().is_some_and(|beat| {
-                beat.power == Power::OperationEnabled && beat.synced && beat.open && beat.epoch == epoch
+        self.drives.iter().position(|link| {
+            link.beat().is_none_or(|beat| {
+                beat.power != Power::OperationEnabled || !beat.synced || !beat.open || beat.epoch != epoch
             })
         })
     }
@@ -535,9 +554,15 @@ impl HostNode {
 
     fn upload(&mut self, mut upload: Upload, tick: u64, sent: bool) -> Result<Phase, HostError> {
         if let Some(ticks) = upload.agreed()? {
-            if !self.all_enabled() {
-                return Ok(Phase::Uploading(upload));
+            if let Some(axis) = self.unready() {
+                let patience = (UNREADY_NS / u64::from(self.tick_ns)).max(self.timing.answer);
+                return if tick >= *self.unready_since.get_or_insert(tick) + patience {
+                    Err(HostError::Unready { axis, beat: self.drives[axis].beat().copied() })
+                } else {
+                    Ok(Phase::Uploading(upload))
+                };
             }
+            self.unready_since = None;
             let joins = upload.packed().header.joint.is_some();
             if self.loose && !joins && !self.is_at_rest() {
                 return Ok(Phase::Uploading(upload));
@@ -601,6 +626,16 @@ impl HostNode {
             return Ok(Phase::Starting { upload, run, repeat_at });
         }
         Ok(Phase::Starting { upload, run, repeat_at })
+    }
+}
+
+/// Why a drive is not ready to move.
+fn unready(beat: Option<&Beat>) -> &'static str {
+    match beat {
+        None => "it sends no beats",
+        Some(beat) if beat.power != Power::OperationEnabled => "it does not get torque",
+        Some(beat) if !beat.synced => "its clock does not come to agree with the time master's",
+        Some(_) => "it does not keep the epoch that it has opened",
     }
 }
 

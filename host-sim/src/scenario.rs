@@ -137,6 +137,7 @@ pub fn simulate_on(
     }
     let timing = settings.host_timing(plan.tick_s, axes);
     let mut host = HostNode::new(axes as u8, settings.bus.format, timing, bus);
+    host.set_tick_ns(plan.tick_ns);
     plan.orders.iter().cloned().for_each(|order| host.push(order));
     host.close();
     let recording = Recording::new(machine, plan.tick_s, &plan.origin);

@@ -86,6 +86,11 @@ pub(crate) fn failed(error: &HostError, header: &FileHeader) -> Failure {
             format!("axis {} (node {}) does not fit: {mismatch}", name(*axis), axis + 1),
             "Name the machine file of these drives with --machine, or flash them anew.".to_owned(),
         ),
+        HostError::Unready { axis, .. } => (
+            format!("{error}: axis {}, node {}", name(*axis), axis + 1),
+            "`feedspline status` shows power states and clocks; a fault is reset by the next command that moves it."
+                .to_owned(),
+        ),
         HostError::Stopped { axis } => (
             format!("the axes have stopped on their path, axis {} first", name(*axis)),
             "Somebody has stopped them, or a drive or the host was not heard. They stand still; begin anew from there."

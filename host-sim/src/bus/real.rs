@@ -10,7 +10,7 @@ mod socket;
 use std::collections::VecDeque;
 use std::path::Path;
 
-use super::{Bus, Frame, FrameSize, Nanoseconds, NodeIndex, Received, Traffic};
+use super::{Bus, Frame, FrameSize, Nanoseconds, NodeIndex, Received, Traffic, keep_event};
 
 /// How long a frame may wait for the system to take it [ns].
 const STALE_NS: Nanoseconds = 200_000_000;
@@ -94,7 +94,7 @@ fn socket(name: &str, _: FrameSize) -> Result<Box<dyn Wire>, BusError> {
 #[derive(Debug, Default)]
 struct Local {
     received: VecDeque<Received>,
-    sent: Option<Received>,
+    sent: VecDeque<Received>,
     waiting: usize,
 }
 
@@ -141,7 +141,7 @@ impl Live {
         self.traffic.bytes += frame.data().len() as u64;
         for (i, node) in self.nodes.iter_mut().enumerate() {
             if Some(NodeIndex(i)) == from {
-                node.sent = Some(Received { time, frame });
+                keep_event(&mut node.sent, Received { time, frame });
             } else {
                 node.received.push_back(Received { time, frame });
             }
@@ -180,7 +180,7 @@ impl Bus for Live {
     }
 
     fn sent(&mut self, node: NodeIndex) -> Option<Received> {
-        self.nodes[node.0].sent.take()
+        self.nodes[node.0].sent.pop_front()
     }
 
     fn waiting(&self, node: NodeIndex) -> usize {
