@@ -235,7 +235,7 @@ fn a_clock_that_never_agrees_is_an_error_that_names_its_axis() {
 
 #[test]
 fn drives_of_every_tick_come_to_agree() {
-    for tick_s in [1e-4, 2.5e-4, 3e-4, 5e-4, 7e-4, 1e-3, 2e-3, 3e-3, 4e-3] {
+    for tick_s in [1e-4, 2.5e-4, 3e-4, 5e-4, 7e-4, 1e-3, 2e-3, 3e-3] {
         let machine = Machine { control_tick_s: tick_s, ..machine() };
         assert!(play(&machine, &SimSettings::default()).at_end, "{tick_s}");
         attempt(&[JobItem::Dwell { seconds: 0.1, line: 1 }], &machine, &SimSettings::default()).unwrap();
