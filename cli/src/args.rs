@@ -6,6 +6,10 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::failure::Failure;
 
+mod live;
+
+pub use live::{BusArgs, HomeArgs, JogArgs, RateArgs, ResumeArgs, StatusArgs, StopArgs, StreamArgs};
+
 /// Fastest motion within a machine's limits, as a table for its drives.
 #[derive(Debug, Parser)]
 #[command(name = "feedspline", version, about, after_help = EXIT_CODES)]
@@ -38,6 +42,20 @@ pub enum Verb {
     Verify(VerifyArgs),
     /// Show what is in a feed table
     Inspect(InspectArgs),
+    /// Play a job on drives while it is planned
+    Stream(StreamArgs),
+    /// Show which drives are on a bus and how they are
+    Status(StatusArgs),
+    /// Hold all axes on their path; `resume` lets them go on
+    Hold(RateArgs),
+    /// Let axes go on along their path, at another rate if asked
+    Resume(ResumeArgs),
+    /// Stop all axes; what was going on ends
+    Stop(StopArgs),
+    /// Move one axis at a velocity
+    Jog(JogArgs),
+    /// Bring axes to zero, or to other positions
+    Home(HomeArgs),
     /// Build a drive's image, put it where it runs, and ask it who it is
     Flash(FlashArgs),
 }
@@ -63,6 +81,13 @@ impl Verb {
             Verb::Verify(args) => args.speech.talk(),
             Verb::Inspect(args) => args.speech.talk(),
             Verb::Flash(args) => args.speech.talk(),
+            Verb::Stream(args) => args.speech.talk(),
+            Verb::Status(args) => args.speech.talk(),
+            Verb::Hold(args) => args.speech.talk(),
+            Verb::Resume(args) => args.rate.speech.talk(),
+            Verb::Stop(args) => args.speech.talk(),
+            Verb::Jog(args) => args.speech.talk(),
+            Verb::Home(args) => args.speech.talk(),
         }
     }
 }
@@ -291,6 +316,21 @@ pub struct MoveArgs {
     /// How axes wait for each other, unless a column says so
     #[arg(long, value_enum, default_value_t, value_name = "HOW")]
     pub sync: Sync,
+    /// Bus of drives that make the move: sim, can0, vcan0, slcan:PATH; without it the move is only planned
+    #[arg(long, value_name = "BUS", requires = "to", conflicts_with_all = ["file", "p0", "p1"])]
+    pub bus: Option<String>,
+    /// Drives send CAN FD
+    #[arg(long, requires = "bus")]
+    pub fd: bool,
+    /// Where drives bring an axis, such as X=12.5; may be given again for others
+    #[arg(long, value_name = "AXIS=POSITION", requires = "bus", allow_negative_numbers = true)]
+    pub to: Vec<String>,
+    /// No faster than this [axis unit/s]
+    #[arg(long, value_name = "V", requires = "bus")]
+    pub velocity: Option<f64>,
+    /// Machine file of the drives; a built-in 3-axis mill without it
+    #[arg(long, value_name = "FILE", requires = "bus")]
+    pub machine: Option<PathBuf>,
     /// What to say.
     #[command(flatten)]
     pub speech: Speech,

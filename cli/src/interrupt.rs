@@ -2,10 +2,27 @@
 
 use std::fs;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Exit status after Ctrl-C and after a request to end: 128 and the number of SIGINT, as shells count.
 pub const EXIT_INTERRUPTED: u8 = 130;
+
+/// Axes move at this process' command.
+static LIVE: AtomicBool = AtomicBool::new(false);
+static PRESSES: AtomicU32 = AtomicU32::new(0);
+/// Presses that are left to whoever moves axes.
+const MOST_PRESSES: u32 = 2;
+
+/// From now on the first two interrupts are counted, and left to whoever asks for them.
+pub(crate) fn count_presses() {
+    LIVE.store(true, Ordering::Relaxed);
+}
+
+/// Interrupts so far.
+pub(crate) fn presses() -> u32 {
+    PRESSES.load(Ordering::Relaxed)
+}
 
 static PENDING: Mutex<Pending> = Mutex::new(Pending { files: Vec::new(), folders: Vec::new() });
 
@@ -42,6 +59,10 @@ impl Pending {
 pub fn tidy_up_on_interrupt() {
     // Without a handler the signals end the process as ever; only temporary files may stay.
     let _ = ctrlc::try_set_handler(|| {
+        // Whoever moves axes brings them to rest; who presses a third time does not want to wait for that.
+        if LIVE.load(Ordering::Relaxed) && PRESSES.fetch_add(1, Ordering::Relaxed) < MOST_PRESSES {
+            return;
+        }
         // Held until the process is gone, so that nothing new comes up.
         let mut pending = pending();
         pending.remove();

@@ -11,10 +11,12 @@ use crate::failure::{Blame, Failure};
 
 mod compare;
 mod flash;
+mod live;
 mod motion;
 
 pub use compare::{CompareFilesJson, CompareJson, MethodJson, MethodState};
 pub use flash::{DriveLimitsJson, FlashJson};
+pub use live::{AxisAtJson, DriveJson, ErrandJson, StatusJson, StopJson, StreamJson};
 pub use motion::{MoveAxisJson, MoveErrorJson, MoveJson, PhaseJson, StateJson, sync_name};
 
 /// The object of `plan` and `run`, also written as plan.json.

@@ -10,6 +10,7 @@ pub mod engine;
 pub mod failure;
 pub mod interrupt;
 pub mod json;
+mod live;
 pub mod local;
 pub mod memory;
 pub mod moves;
@@ -59,6 +60,13 @@ pub fn status(
         Verb::Run(args) => verbs::run::execute(args, engine, &mut console),
         Verb::Compare(args) => verbs::compare::execute(args, engine, &mut console),
         Verb::Move(args) => verbs::motion::execute(args, &mut console),
+        Verb::Stream(args) => verbs::stream::execute(args, &mut console),
+        Verb::Status(args) => verbs::remote::status(args, &mut console),
+        Verb::Hold(args) => verbs::remote::hold(args, &mut console),
+        Verb::Resume(args) => verbs::remote::resume(args, &mut console),
+        Verb::Stop(args) => verbs::remote::stop(args, &mut console),
+        Verb::Jog(args) => verbs::errand::jog(args, &mut console),
+        Verb::Home(args) => verbs::errand::home(args, &mut console),
         Verb::Flash(args) => verbs::flash::execute(args, &mut console),
         Verb::Sample(args) => verbs::sample::execute(args, &mut console),
         Verb::Verify(args) => verbs::verify::execute(args, engine, &mut console),
@@ -68,6 +76,7 @@ pub fn status(
         Ok(verbs::Verdict::Holds) => 0,
         Ok(verbs::Verdict::Broken) => EXIT_FAILED,
         Ok(verbs::Verdict::Refused) => EXIT_BAD_INPUT,
+        Ok(verbs::Verdict::Stopped) => interrupt::EXIT_INTERRUPTED,
         Err(failure) => {
             console.fail(&failure);
             failure.exit_status()

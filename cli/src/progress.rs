@@ -49,6 +49,13 @@ impl Progress {
         }
     }
 
+    /// Says more of what is being done.
+    pub fn note(&mut self, text: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(text.to_owned());
+        }
+    }
+
     /// Tells the share of the stage that is done, 0 to 1.
     pub fn share(&mut self, done: f64) {
         let Some(since) = self.since else { return };

@@ -1,5 +1,7 @@
 //! What a verb prints for people: one aligned column of names, one of values.
 
+pub mod live;
+
 use crate::json::{
     BusJson, CertificateJson, CompareJson, DriveLimitsJson, FlashJson, InspectJson, MethodJson, MethodState,
     MoveJson, PhaseJson, PlanJson, SampleJson, StateJson, VerifyJson,

@@ -116,6 +116,11 @@ impl Clock {
             && self.own(now).saturating_sub(self.last) < STALE_NS
     }
 
+    /// The control tick is longer than a SYNC's time can say.
+    pub fn is_coarse(&self) -> bool {
+        self.tick_ns >> 24 != 0
+    }
+
     /// How far the last measurements were from what was expected of them [ns].
     pub fn residual_ns(&self) -> f32 {
         self.noise.max(self.offset.abs())

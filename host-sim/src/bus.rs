@@ -9,8 +9,11 @@ pub mod can;
 mod in_process;
 mod lossy;
 mod meddler;
+pub mod real;
 mod recorder;
 mod timing;
+
+use std::collections::VecDeque;
 
 pub use bits::{Stuffing, WireBits};
 pub use can::CanBus;
@@ -21,11 +24,19 @@ pub use protocol::bus::{Frame, FrameSize};
 pub use recorder::Recorder;
 pub use timing::BitTiming;
 
-/// Transmit events that a controller keeps.
-const EVENTS: usize = 32;
-
 /// Virtual time since the simulation began [ns].
 pub type Nanoseconds = u64;
+
+/// Transmit events that a controller keeps, the newest.
+pub const TRANSMIT_EVENTS: usize = 32;
+
+/// Keeps one transmit event.
+fn keep_event(events: &mut VecDeque<Received>, event: Received) {
+    if events.len() >= TRANSMIT_EVENTS {
+        events.pop_front();
+    }
+    events.push_back(event);
+}
 
 /// A participant of the bus, in the order of attaching.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -70,8 +81,8 @@ pub trait Bus {
     /// The oldest frame that has reached `node` and has not been taken yet.
     fn receive(&mut self, node: NodeIndex) -> Option<Received>;
 
-    /// The oldest frame of `node` that has crossed and was not asked for: what a controller's transmit events tell. Old ones are
-    /// lost when nobody asks.
+    /// The oldest frame of `node` that has crossed and was not told yet, as a controller's transmit events tell it. Events
+    /// that nobody takes are lost after [`TRANSMIT_EVENTS`].
     fn sent(&mut self, node: NodeIndex) -> Option<Received>;
 
     /// Frames of `node` still waiting to be sent.

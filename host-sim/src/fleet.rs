@@ -74,7 +74,8 @@ struct Member<'m> {
 #[derive(Debug)]
 pub struct Fleet<'m> {
     members: Vec<Member<'m>>,
-    host: Option<HostNode<'m>>,
+    host: HostNode,
+    alive: bool,
     host_next: f64,
     settings: FleetSettings,
     random: fastrand::Rng,
@@ -86,7 +87,7 @@ impl<'m> Fleet<'m> {
     pub fn new(
         configs: &[DriveConfig],
         buffers: &'m mut [Buffers],
-        host: HostNode<'m>,
+        host: HostNode,
         settings: FleetSettings,
         bus: &mut dyn Bus,
     ) -> Self {
@@ -99,7 +100,7 @@ impl<'m> Fleet<'m> {
             next: settings.starts.get(axis).copied().unwrap_or(0) as f64,
         });
         let random = fastrand::Rng::with_seed(settings.seed);
-        Self { members: members.collect(), host: Some(host), host_next: 0.0, settings, random, now: 0 }
+        Self { members: members.collect(), host, alive: true, host_next: 0.0, settings, random, now: 0 }
     }
 
     /// Time since the beginning [ns].
@@ -107,19 +108,19 @@ impl<'m> Fleet<'m> {
         self.now
     }
 
-    /// The host, while it lives.
-    pub fn host(&mut self) -> Option<&mut HostNode<'m>> {
-        self.host.as_mut()
+    /// The host, dead or alive.
+    pub fn host(&mut self) -> &mut HostNode {
+        &mut self.host
     }
 
     /// The host dies; what it has queued in its interface still goes out.
     pub fn kill_host(&mut self) {
-        self.host = None;
+        self.alive = false;
     }
 
     /// Another host takes over, which is on the bus already.
-    pub fn replace_host(&mut self, host: HostNode<'m>) {
-        self.host = Some(host);
+    pub fn replace_host(&mut self, host: HostNode) {
+        (self.host, self.alive) = (host, true);
         self.host_next = self.now as f64;
     }
 
@@ -153,15 +154,13 @@ impl<'m> Fleet<'m> {
         let first = self.members.iter().enumerate().min_by(|a, b| a.1.next.total_cmp(&b.1.next));
         let axis = first.map(|(axis, _)| axis);
         let drive_next = axis.map_or(f64::INFINITY, |axis| self.members[axis].next);
-        if let Some(host) = &mut self.host
-            && self.host_next <= drive_next
-        {
+        if self.alive && self.host_next <= drive_next {
             self.now = self.now.max(self.host_next as Nanoseconds);
             bus.advance(self.now);
             let late = self.random.f64() * self.settings.host_jitter as f64;
             self.host_next += self.settings.host_period as f64;
             self.host_next = self.host_next.max(self.now as f64 + late);
-            return match host.turn(bus, self.now) {
+            return match self.host.turn(bus, self.now) {
                 Ok(()) => Event::Host,
                 Err(error) => Event::Failed(error),
             };

@@ -12,18 +12,21 @@ mod link;
 mod upload;
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use planner::feed::pack::Packed;
+use protocol::bus::beat::Beat;
 use protocol::bus::stop::Stop;
 use protocol::bus::{Frame, FrameSize, Node};
-use protocol::message::{DriveMessage, Fault, Reject, Status};
+use protocol::message::{DriveMessage, Fault, HostMessage, Reject, Status};
 use protocol::power::{Power, PowerEvent};
 
 use crate::bus::{Bus, Nanoseconds, NodeIndex};
 use command::{Change, Command};
 use greeting::Greeting;
 pub use greeting::Mismatch;
-use link::{Heard, Link};
+use link::Heard;
+pub use link::Link;
 use upload::Upload;
 
 /// Frames the host keeps in its interface's queue, so that the wire never waits for the host.
@@ -32,13 +35,15 @@ const QUEUED_FRAMES: usize = 48;
 const STOP_COPIES: usize = 3;
 /// Rounds without progress after which a drive counts as silent.
 const MAX_ROUNDS: u32 = 40;
+/// How long a drive with its table may take until it is ready to move [ns].
+const UNREADY_NS: u64 = 60_000_000_000;
 /// How much the time between command and start may grow after starts that were called off.
 const MAX_LEAD_GROWTH: u32 = 6;
 
 /// One table to play.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Order {
-    /// The table; its number is its place among the orders.
+    /// The table.
     pub packed: Packed,
     /// Ticks at rest before it, on top of the handover.
     pub pause: u64,
@@ -119,6 +124,14 @@ pub enum HostError {
         /// Which axis, or the first one of all.
         axis: usize,
     },
+    /// A drive does not get ready to move.
+    #[error("axis {axis} is not ready to move: {}", unready(beat.as_ref()))]
+    Unready {
+        /// Which axis.
+        axis: usize,
+        /// What it has said last.
+        beat: Option<Beat>,
+    },
     /// The drives have stopped on their path.
     #[error("axis {axis} has ended its epoch: the drives stop on their path")]
     Stopped {
@@ -138,15 +151,21 @@ pub struct HostCounters {
 
 /// The host.
 #[derive(Debug)]
-pub struct HostNode<'a> {
+pub struct HostNode {
     node: NodeIndex,
     frames: FrameSize,
     timing: HostTiming,
-    orders: &'a [Order],
+    /// Tables that are not confirmed yet, and the last one that is.
+    orders: VecDeque<Arc<Order>>,
+    /// How many are no longer among them.
+    dropped: usize,
+    /// No more will come.
+    closed: bool,
+    tick_ns: u32,
     drives: Vec<Link>,
     greeting: Greeting,
     next: usize,
-    phase: Phase<'a>,
+    phase: Phase,
     outbox: VecDeque<Command>,
     /// Frames of commands that did not fit the interface's queue.
     pending: VecDeque<Frame>,
@@ -155,38 +174,40 @@ pub struct HostNode<'a> {
     /// When drives without torque are told again to enable operation.
     enable_at: u64,
     alive_at: u64,
+    /// Since when drives that hold a table are waited for.
+    unready_since: Option<u64>,
     change: Option<Change>,
     changes: u8,
+    /// When motion ends is known to the drives only: it was put together of pieces, or its rate has been changed.
+    loose: bool,
     stopped: bool,
+    refusal: Option<Reject>,
     /// A tick of the drives' count, and when it was told.
     reading: Option<(u64, Nanoseconds)>,
     counters: HostCounters,
 }
 
 #[derive(Debug)]
-enum Phase<'a> {
+enum Phase {
     /// Nothing is on its way.
     Idle,
     /// A table is being sent.
-    Uploading(Upload<'a>),
+    Uploading(Upload),
     /// All drives hold the table and are told when it starts.
-    Starting { upload: Upload<'a>, run: Run, repeat_at: u64 },
+    Starting { upload: Upload, run: Run, repeat_at: u64 },
 }
 
-impl<'a> HostNode<'a> {
-    /// A host that will have `orders` played by as many drives as their tables have axes, at the addresses from 1.
-    pub fn new(
-        orders: &'a [Order],
-        axes: u8,
-        frames: FrameSize,
-        timing: HostTiming,
-        bus: &mut dyn Bus,
-    ) -> Self {
+impl HostNode {
+    /// A host of as many drives as there are axes, at the addresses from 1, that waits for orders.
+    pub fn new(axes: u8, frames: FrameSize, timing: HostTiming, bus: &mut dyn Bus) -> Self {
         Self {
             node: bus.attach(),
             frames,
             timing,
-            orders,
+            orders: VecDeque::new(),
+            dropped: 0,
+            closed: false,
+            tick_ns: 1_000_000,
             drives: (1..=axes).filter_map(Node::new).map(Link::new).collect(),
             greeting: Greeting::default(),
             next: 0,
@@ -197,12 +218,39 @@ impl<'a> HostNode<'a> {
             lead_growth: 0,
             enable_at: 0,
             alive_at: 0,
+            unready_since: None,
             change: None,
             changes: 0,
+            loose: false,
             stopped: false,
+            refusal: None,
             reading: None,
             counters: HostCounters::default(),
         }
+    }
+
+    /// Another table to play, behind all others.
+    pub fn push(&mut self, order: Order) {
+        self.tick_ns = order.packed.header.tick_ns.max(1);
+        self.orders.push_back(Arc::new(order));
+    }
+
+    /// No more tables will come.
+    pub fn close(&mut self) {
+        self.closed = true;
+    }
+
+    /// It has less than two tables in hand that drives could take, and more are to come.
+    pub fn is_hungry(&self) -> bool {
+        !self.closed && self.waiting() < 2
+    }
+
+    fn waiting(&self) -> usize {
+        (self.dropped + self.orders.len()).saturating_sub(self.next)
+    }
+
+    fn order(&self, number: usize) -> Option<&Arc<Order>> {
+        self.orders.get(number.checked_sub(self.dropped)?)
     }
 
     /// One turn of a host that knows of the drives' count what they tell: a tick of it is some ticks old.
@@ -219,9 +267,8 @@ impl<'a> HostNode<'a> {
 
     /// The tick of the drives' common count, as far as the host knows.
     pub fn tick_at(&self, now: Nanoseconds) -> u64 {
-        let tick_ns = u64::from(self.orders.first().map_or(1_000_000, |o| o.packed.header.tick_ns));
         let (tick, then) = self.reading.unwrap_or_default();
-        tick + now.saturating_sub(then) / tick_ns.max(1)
+        tick + now.saturating_sub(then) / u64::from(self.tick_ns)
     }
 
     /// One turn, at tick `tick` of the drives' common count.
@@ -286,13 +333,17 @@ impl<'a> HostNode<'a> {
 
     /// Whether all tables have been played at `tick`.
     pub fn is_finished(&self, tick: u64) -> bool {
-        let joined = self.orders.last().is_some_and(|order| order.packed.header.joint.is_some());
-        let played = if joined {
+        let played = if self.loose {
             self.drives.iter().all(Link::has_come_to_rest)
         } else {
             self.runs.back().is_none_or(|r| tick > r.start + r.ticks)
         };
-        self.next == self.orders.len() && matches!(self.phase, Phase::Idle) && played
+        self.closed && self.waiting() == 0 && matches!(self.phase, Phase::Idle) && played
+    }
+
+    /// Whether all drives stand still, after a stop or otherwise.
+    pub fn is_at_rest(&self) -> bool {
+        self.drives.iter().all(Link::stands)
     }
 
     /// What the host has gone through.
@@ -305,6 +356,12 @@ impl<'a> HostNode<'a> {
         self.next
     }
 
+    /// The axes are on a motion of which a piece is still to be confirmed.
+    pub fn has_more_of_the_motion(&self) -> bool {
+        let joins = self.order(self.next).is_some_and(|order| order.packed.header.joint.is_some());
+        joins && !self.is_at_rest()
+    }
+
     /// What every drive has told last, in the order of the axes.
     pub fn drives(&self) -> impl Iterator<Item = &Link> {
         self.drives.iter()
@@ -313,9 +370,44 @@ impl<'a> HostNode<'a> {
     /// Path time goes at another rate [0.1 %] as soon as all drives have confirmed it; what has not been confirmed by its tick
     /// becomes a stop on the path.
     pub fn change_rate(&mut self, permille: u16, tick: u64) {
-        self.changes = if self.changes == u8::MAX { 1 } else { self.changes + 1 };
+        // Somebody else may have changed it since.
+        let known = self.drives.iter().filter_map(Link::beat).map(|beat| beat.change);
+        let last = known.fold(self.changes, u8::max);
+        self.changes = if last == u8::MAX { 1 } else { last + 1 };
         let tick = tick + self.timing.lead.max(2 * self.timing.guard);
+        self.loose = true;
         self.change = Some(Change { permille, tick, number: self.changes, repeat_at: 0 });
+    }
+
+    /// All drives follow set-points, in step with each other, and may be told to move.
+    pub fn is_ready(&self) -> bool {
+        self.greeting.is_open() && self.all_enabled()
+    }
+
+    /// The control tick of the drives, where no table tells it.
+    pub fn set_tick_ns(&mut self, tick_ns: u32) {
+        self.tick_ns = tick_ns.max(1);
+    }
+
+    /// Why a drive has refused what it was told last, if it has.
+    pub fn refusal(&self) -> Option<Reject> {
+        self.refusal
+    }
+
+    /// Tells one drive something, inside the open epoch.
+    pub fn tell(&mut self, axis: usize, message: HostMessage<'static>) {
+        self.outbox.push_back(Command::Tell(axis, message));
+    }
+
+    /// Ends the epoch of drives that have nothing left to do.
+    pub fn part(&mut self) {
+        self.outbox.extend([Command::Cancel; STOP_COPIES]);
+        self.stopped = true;
+    }
+
+    /// Everything has been handed to the bus.
+    pub fn has_said_all(&self) -> bool {
+        self.outbox.is_empty() && self.pending.is_empty()
     }
 
     /// Stops all drives; the epoch ends.
@@ -324,7 +416,8 @@ impl<'a> HostNode<'a> {
         self.pending.clear();
         self.outbox.extend([Command::Stop(stop); STOP_COPIES]);
         self.phase = Phase::Idle;
-        self.next = self.orders.len();
+        self.orders.clear();
+        (self.dropped, self.closed) = (self.next, true);
         self.stopped = true;
     }
 
@@ -366,7 +459,14 @@ impl<'a> HostNode<'a> {
             _ => {}
         }
         match &mut self.phase {
-            Phase::Idle => Ok(()),
+            Phase::Idle => {
+                if let DriveMessage::Reject { reason, .. } = message
+                    && !refused_without_torque(&message)
+                {
+                    self.refusal = Some(reason);
+                }
+                Ok(())
+            }
             // Commands on the way to torque may get lost and are repeated; what is refused then is no loss.
             Phase::Uploading(_) if refused_without_torque(&message) => Ok(()),
             Phase::Uploading(upload) | Phase::Starting { upload, .. } => upload.answered(axis, &message),
@@ -407,8 +507,10 @@ impl<'a> HostNode<'a> {
         }
         if !self.greeting.is_open() {
             if sent {
-                let needs = self.orders.first().map(|order| &order.packed);
-                let commands = self.greeting.proceed(&mut self.drives, needs, tick, self.timing.answer)?;
+                let needs = self.order(self.next).cloned();
+                let needs = needs.as_ref().map(|order| &order.packed);
+                let commands =
+                    self.greeting.proceed(&mut self.drives, needs, self.tick_ns, tick, self.timing.answer)?;
                 self.outbox.extend(commands);
             }
             return Ok(());
@@ -470,39 +572,63 @@ impl<'a> HostNode<'a> {
 
     /// All drives follow set-points, in step with each other.
     fn all_enabled(&self) -> bool {
+        self.unready().is_none()
+    }
+
+    /// The first drive that does not follow set-points in step with the others.
+    fn unready(&self) -> Option<usize> {
         let epoch = self.greeting.epoch() as u8;
-        self.drives.iter().all(|link| {
-            link.beat().is_some_and(|beat| {
-                beat.power == Power::OperationEnabled && beat.synced && beat.open && beat.epoch == epoch
+        self.drives.iter().position(|link| {
+            link.beat().is_none_or(|beat| {
+                beat.power != Power::OperationEnabled || !beat.synced || !beat.open || beat.epoch != epoch
             })
         })
     }
 
     /// Takes up the next order once the drives have a buffer free: when the table before it plays.
-    fn begin(&mut self, tick: u64) -> Phase<'a> {
+    fn begin(&mut self, tick: u64) -> Phase {
         while self.runs.len() > 1 && self.runs[0].start + self.runs[0].ticks < tick {
             self.runs.pop_front();
         }
-        let Some(order) = self.orders.get(self.next) else { return Phase::Idle };
-        let joins = order.packed.header.joint.is_some();
+        while self.dropped < self.next && self.orders.pop_front().is_some() {
+            self.dropped += 1;
+        }
+        let Some(order) = self.order(self.next).cloned() else { return Phase::Idle };
         let free = || self.drives.iter().all(|link| link.beat().is_some_and(|beat| beat.free > 0));
-        let ready = if joins { free() } else { self.runs.back().is_none_or(|r| tick > r.start) };
+        let ready = if self.loose || order.packed.header.joint.is_some() {
+            free()
+        } else {
+            self.runs.back().is_none_or(|r| tick > r.start)
+        };
         if !ready {
             return Phase::Idle;
         }
-        let upload = Upload::new(&order.packed, self.drives.len(), self.frames);
+        let upload = Upload::new(order, self.drives.len(), self.frames);
         self.outbox.extend(upload.everything().map(Command::Send));
         Phase::Uploading(upload)
     }
 
-    fn upload(&mut self, mut upload: Upload<'a>, tick: u64, sent: bool) -> Result<Phase<'a>, HostError> {
+    fn upload(&mut self, mut upload: Upload, tick: u64, sent: bool) -> Result<Phase, HostError> {
         if let Some(ticks) = upload.agreed()? {
-            if !self.all_enabled() {
+            if let Some(axis) = self.unready() {
+                let patience = (UNREADY_NS / u64::from(self.tick_ns)).max(self.timing.answer);
+                return if tick >= *self.unready_since.get_or_insert(tick) + patience {
+                    Err(HostError::Unready { axis, beat: self.drives[axis].beat().copied() })
+                } else {
+                    Ok(Phase::Uploading(upload))
+                };
+            }
+            self.unready_since = None;
+            let joins = upload.packed().header.joint.is_some();
+            if self.loose && !joins && !self.is_at_rest() {
                 return Ok(Phase::Uploading(upload));
             }
             let earliest = tick + (self.timing.lead << self.lead_growth);
-            let after = self.runs.back().map_or(0, |r| r.start + r.ticks + self.timing.handover);
-            let start = earliest.max(after + self.orders[self.next].pause);
+            let after = match self.runs.back() {
+                Some(_) if self.loose => tick + self.timing.handover,
+                last => last.map_or(0, |r| r.start + r.ticks + self.timing.handover),
+            };
+            let start = earliest.max(after + upload.pause());
             let run = Run { order: self.next, start, ticks };
             return Ok(Phase::Starting { upload, run, repeat_at: tick });
         }
@@ -513,28 +639,21 @@ impl<'a> HostNode<'a> {
     }
 
     /// Sends again what is missing.
-    fn again(&mut self, upload: &mut Upload<'a>) -> Result<(), HostError> {
+    fn again(&mut self, upload: &mut Upload) -> Result<(), HostError> {
         let before = self.outbox.len();
         self.outbox.extend(upload.missing(MAX_ROUNDS)?.into_iter().map(Command::Send));
         self.counters.resent_blocks += (self.outbox.len() - before) as u64;
         Ok(())
     }
 
-    fn start(
-        &mut self,
-        mut upload: Upload<'a>,
-        run: Run,
-        repeat_at: u64,
-        tick: u64,
-    ) -> Result<Phase<'a>, HostError> {
-        let joins = self.orders[run.order].packed.header.joint.is_some();
+    fn start(&mut self, mut upload: Upload, run: Run, repeat_at: u64, tick: u64) -> Result<Phase, HostError> {
+        let joins = upload.packed().header.joint.is_some();
         let table = upload.table();
         let confirmed =
             |link: &Link| link.beat().is_some_and(|b| b.committed == (table as u8).wrapping_add(1));
         if self.drives.iter().all(confirmed) {
             if joins {
-                // How long the whole motion is, the drives know.
-                self.runs.truncate(1);
+                self.loose = true;
             } else {
                 self.runs.push_back(run);
             }
@@ -563,6 +682,16 @@ impl<'a> HostNode<'a> {
             return Ok(Phase::Starting { upload, run, repeat_at });
         }
         Ok(Phase::Starting { upload, run, repeat_at })
+    }
+}
+
+/// Why a drive is not ready to move.
+fn unready(beat: Option<&Beat>) -> &'static str {
+    match beat {
+        None => "it sends no beats",
+        Some(beat) if beat.power != Power::OperationEnabled => "it does not get torque",
+        Some(beat) if !beat.synced => "its clock does not come to agree with the time master's",
+        Some(_) => "it does not keep the epoch that it has opened",
     }
 }
 

@@ -7,6 +7,7 @@ pub use settings::{Loss, Progress, SimError, SimSettings};
 use firmware_core::axis::{AxisConfig, Excess};
 use firmware_core::drive::DriveConfig;
 use firmware_core::session::Watch;
+use planner::feed::file::FileHeader;
 use planner::feed::job::{JobItem, PlannedSection};
 use planner::feed::pack::{Target, limits_in_counts, pack};
 use planner::feed::table::FeedTable;
@@ -56,6 +57,42 @@ impl Cast {
     }
 }
 
+/// A drive of a machine, at rest at `position` [counts]; with `free_jerk` it takes tables that do not limit jerk.
+///
+/// # Errors
+/// The machine has more axes than a bus has drives.
+pub fn drive_config(
+    header: &FileHeader,
+    axis: usize,
+    position: i64,
+    free_jerk: bool,
+    settings: &SimSettings,
+) -> Result<DriveConfig, SimError> {
+    let axes = header.axes.len();
+    let a = header.axes.get(axis).ok_or(SimError::AxisCount { axes })?;
+    let jerk = if free_jerk { f64::INFINITY } else { a.limits.jerk.max(a.rapid.jerk) };
+    let limits = AxisLimits {
+        velocity: a.limits.velocity.max(a.rapid.velocity),
+        acceleration: a.limits.acceleration.max(a.rapid.acceleration),
+        jerk,
+    };
+    let address = u8::try_from(axis + 1).ok().and_then(Node::new).ok_or(SimError::AxisCount { axes })?;
+    let (tick_ns, rule) = (header.tick_ns, header.override_rule);
+    let status_ticks = settings.status_ticks(f64::from(tick_ns) * 1e-9);
+    Ok(DriveConfig {
+        node: address,
+        frames: settings.bus.format,
+        watch: Watch { boot: axis as u32 + 1, ..Watch::new(tick_ns, status_ticks) },
+        // The planner keeps programs within the travel; paths may leave it by their tolerance.
+        axis: AxisConfig {
+            position,
+            excess: Excess { acceleration: rule.acceleration as f32, jerk: rule.jerk as f32 },
+            status_ticks,
+            ..AxisConfig::new(axis as u8, tick_ns, limits_in_counts(&limits, a.counts_per_unit))
+        },
+    })
+}
+
 /// Plays `job` on a bus of its own, with the losses of `settings`.
 ///
 /// # Errors
@@ -99,7 +136,10 @@ pub fn simulate_on(
         drives.push(DriveNode::new(plan.drive(axis, settings)?, buffers, bus));
     }
     let timing = settings.host_timing(plan.tick_s, axes);
-    let mut host = HostNode::new(&plan.orders, axes as u8, settings.bus.format, timing, bus);
+    let mut host = HostNode::new(axes as u8, settings.bus.format, timing, bus);
+    host.set_tick_ns(plan.tick_ns);
+    plan.orders.iter().cloned().for_each(|order| host.push(order));
+    host.close();
     let recording = Recording::new(machine, plan.tick_s, &plan.origin);
     let mut recording =
         recording.map_err(|(i, source)| SimError::Axis { axis: machine.axes[i].name.clone(), source })?;
@@ -243,30 +283,8 @@ impl<'a> Programme<'a> {
     }
 
     fn drive(&self, axis: usize, settings: &SimSettings) -> Result<DriveConfig, SimError> {
-        let a = &self.machine.axes[axis];
-        let jerk = if self.free_jerk { f64::INFINITY } else { a.limits.jerk.max(a.rapid.jerk) };
-        let limits = AxisLimits {
-            velocity: a.limits.velocity.max(a.rapid.velocity),
-            acceleration: a.limits.acceleration.max(a.rapid.acceleration),
-            jerk,
-        };
-        let address = Node::new(axis as u8 + 1);
-        let rule = self.machine.override_rule;
-        Ok(DriveConfig {
-            node: address.ok_or(SimError::AxisCount { axes: self.machine.axes.len() })?,
-            frames: settings.bus.format,
-            // The planner keeps programs within the travel; paths may leave it by their tolerance.
-            watch: Watch {
-                boot: axis as u32 + 1,
-                ..Watch::new(self.tick_ns, settings.status_ticks(self.tick_s))
-            },
-            axis: AxisConfig {
-                position: self.origin[axis],
-                excess: Excess { acceleration: rule.acceleration as f32, jerk: rule.jerk as f32 },
-                status_ticks: settings.status_ticks(self.tick_s),
-                ..AxisConfig::new(axis as u8, self.tick_ns, limits_in_counts(&limits, a.counts_per_unit))
-            },
-        })
+        let header = FileHeader::from(self.machine);
+        drive_config(&header, axis, self.origin[axis], self.free_jerk, settings)
     }
 
     fn expected_ticks(&self, settings: &SimSettings) -> u64 {

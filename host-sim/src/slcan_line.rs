@@ -69,6 +69,23 @@ impl SlcanLine {
         Ok(line)
     }
 
+    /// Opens what is at a path: an adapter, or a socket of the system with frames behind it.
+    ///
+    /// # Errors
+    /// There is nothing, or it is somebody else's.
+    pub fn at(path: &Path) -> Result<Self, LineError> {
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::FileTypeExt;
+            use std::os::unix::net::UnixStream;
+            if std::fs::metadata(path).is_ok_and(|m| m.file_type().is_socket()) {
+                let stream = UnixStream::connect(path).map_err(LineError::Open)?;
+                return Ok(Self::new(stream.try_clone().map_err(LineError::Open)?, stream));
+            }
+        }
+        Self::adapter(path)
+    }
+
     fn write(&mut self, bytes: &[u8]) -> Result<(), LineError> {
         self.input.write_all(bytes).and_then(|()| self.input.flush()).map_err(|_| LineError::Broken)
     }

@@ -52,6 +52,15 @@ impl Job {
         vec![[vec![0; bytes], vec![0; bytes]]; self.cast.drives.len()]
     }
 
+    /// A host that plays the job.
+    pub fn host(&self, bus: &mut dyn Bus) -> HostNode {
+        let (axes, frames) = (self.cast.drives.len() as u8, self.cast.drives[0].frames);
+        let mut host = HostNode::new(axes, frames, self.cast.timing, bus);
+        self.cast.orders.iter().cloned().for_each(|order| host.push(order));
+        host.close();
+        host
+    }
+
     /// Drives and host on a bus.
     pub fn fleet<'m>(
         &'m self,
@@ -59,8 +68,7 @@ impl Job {
         settings: FleetSettings,
         bus: &mut dyn Bus,
     ) -> Fleet<'m> {
-        let (axes, frames) = (self.cast.drives.len() as u8, self.cast.drives[0].frames);
-        let host = HostNode::new(&self.cast.orders, axes, frames, self.cast.timing, bus);
+        let host = self.host(bus);
         Fleet::new(&self.cast.drives, buffers, host, settings, bus)
     }
 

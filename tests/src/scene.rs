@@ -9,7 +9,7 @@
 use host_sim::bus::{BitTiming, Bus, CanBus, Frame, NodeIndex, Stuffing};
 use host_sim::drive_node::Buffers;
 use host_sim::fleet::{Event, Fleet, FleetSettings};
-use host_sim::host_node::{HostError, HostNode};
+use host_sim::host_node::HostError;
 use protocol::message::{State, Status};
 
 use crate::fleet::{Job, PathOracle, Record};
@@ -53,7 +53,7 @@ impl<'m> Scene<'m> {
         bus.controller(somebody).one_shot = true;
         let mut fleet =
             job.fleet(buffers, FleetSettings { host_jitter: 50_000, ..FleetSettings::default() }, &mut bus);
-        let host = fleet.host().unwrap().node();
+        let host = fleet.host().node();
         let origin = job.cast.drives.iter().map(|drive| drive.axis.position).collect();
         let moved = vec![false; fleet.axes()];
         let (heard, record) = (Vec::new(), Record::default());
@@ -62,8 +62,7 @@ impl<'m> Scene<'m> {
 
     /// A new host on a node of its own, which takes the place of the one that was.
     pub fn new_host(&mut self) {
-        let (axes, frames) = (self.job.cast.drives.len() as u8, self.job.cast.drives[0].frames);
-        let host = HostNode::new(&self.job.cast.orders, axes, frames, self.job.cast.timing, &mut self.bus);
+        let host = self.job.host(&mut self.bus);
         self.host = host.node();
         self.fleet.replace_host(host);
         self.error = None;

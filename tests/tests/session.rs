@@ -125,7 +125,7 @@ fn whenever_the_host_dies_the_axes_rest_on_the_path() {
         let mut bus = bus();
         let mut fleet = job.fleet(&mut buffers, FleetSettings::default(), &mut bus);
         run_until_moving(&mut fleet, &mut bus);
-        while fleet.host().is_some_and(|h| !h.is_finished(0)) && fleet.now() < 4_000 * MS {
+        while !fleet.host().is_at_rest() && fleet.now() < 4_000 * MS {
             fleet.step(&mut bus);
         }
         frames += bus.traffic().frames;

@@ -221,6 +221,28 @@ fn a_dead_bus_is_an_error_that_names_the_axis() {
 }
 
 #[test]
+fn a_clock_that_never_agrees_is_an_error_that_names_its_axis() {
+    use host_sim::bus::{Fate, Meddler, NodeIndex};
+    // The second drive gets no times of SYNCs.
+    let mut bus = Meddler::new(InProcessBus::new(BitTiming::default()), |node, received| {
+        if node == NodeIndex(1) && received.frame.id() == 0x012 { Fate::Lose } else { Fate::Pass }
+    });
+    let settings = SimSettings::default();
+    let error = simulate_on(&mut bus, &job(), &machine(), &settings, &mut (), &mut |_| {}).unwrap_err();
+    assert!(matches!(error, SimError::Host(HostError::Unready { axis: 1, .. })), "{error:?}");
+    assert!(error.to_string().contains("clock"), "{error}");
+}
+
+#[test]
+fn drives_of_every_tick_come_to_agree() {
+    for tick_s in [1e-4, 2.5e-4, 3e-4, 5e-4, 7e-4, 1e-3, 2e-3, 3e-3] {
+        let machine = Machine { control_tick_s: tick_s, ..machine() };
+        assert!(play(&machine, &SimSettings::default()).at_end, "{tick_s}");
+        attempt(&[JobItem::Dwell { seconds: 0.1, line: 1 }], &machine, &SimSettings::default()).unwrap();
+    }
+}
+
+#[test]
 fn a_table_beyond_the_drives_limits_is_refused_by_name() {
     let mut job = job();
     let JobItem::Section(section) = &mut job[3] else { panic!("a section") };

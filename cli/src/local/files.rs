@@ -14,7 +14,11 @@ use crate::failure::Failure;
 use crate::json::{AxisRatiosJson, CertificateJson, InspectAxisJson, InspectJson, VerifyJson};
 use crate::progress::Progress;
 
-fn open(path: &Path) -> Result<FeedFile, Failure> {
+/// Reads a file.
+///
+/// # Errors
+/// It is no sound feed table.
+pub(crate) fn open(path: &Path) -> Result<FeedFile, Failure> {
     if path.is_dir() {
         return Err(Failure::unreadable(path, &std::io::ErrorKind::IsADirectory.into()));
     }

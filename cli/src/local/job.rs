@@ -18,11 +18,11 @@ use crate::json::WayPointsJson;
 const BUILT_IN: &str = include_str!("../../../jobs/mill3.toml");
 
 /// The sections of a job, in order.
-pub(super) type Stream<'a> = &'a mut (dyn Iterator<Item = Result<SectionItem, Failure>> + Send);
+pub(crate) type Stream<'a> = &'a mut (dyn Iterator<Item = Result<SectionItem, Failure>> + Send);
 
 /// What is known of a job besides its sections.
 #[derive(Debug)]
-pub(super) struct Told {
+pub(crate) struct Told {
     pub(super) counters: Counters,
     pub(super) comparison: Comparison,
     pub(super) stops: BTreeMap<StopCause, u64>,
@@ -81,8 +81,16 @@ impl InForce {
 ///
 /// # Errors
 /// The machine file is not sound.
-pub(super) fn machine(args: &JobArgs) -> Result<Machine, Failure> {
-    match &args.machine {
+pub(crate) fn machine(args: &JobArgs) -> Result<Machine, Failure> {
+    machine_of(args.machine.as_deref())
+}
+
+/// The machine of a file, or the built-in one.
+///
+/// # Errors
+/// The machine file is not sound.
+pub(crate) fn machine_of(file: Option<&Path>) -> Result<Machine, Failure> {
+    match file {
         Some(path) => Machine::load(path)
             .map_err(|e| placed(e.kind().to_string(), path, e.line(), e.column()).quoting(e)),
         None => Machine::from_toml(BUILT_IN, "built-in machine")
@@ -94,7 +102,7 @@ pub(super) fn machine(args: &JobArgs) -> Result<Machine, Failure> {
 ///
 /// # Errors
 /// Bad input, with its place; or what `consume` fails with.
-pub(super) fn read<R>(
+pub(crate) fn read<R>(
     args: &JobArgs,
     machine: &Machine,
     limits: LimitSet,
@@ -118,7 +126,7 @@ pub(super) fn set_threads(args: &JobArgs) {
 }
 
 /// Bad input in a file, at a place if that is known.
-pub(super) fn placed(message: String, file: &Path, line: Option<u32>, column: Option<u32>) -> Failure {
+pub(crate) fn placed(message: String, file: &Path, line: Option<u32>, column: Option<u32>) -> Failure {
     let failure = Failure::input(message);
     match (line, column) {
         (Some(line), column) => failure.at(file, line, column.unwrap_or(1)),

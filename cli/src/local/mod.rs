@@ -1,9 +1,9 @@
 //! The planner and the simulator of this workspace, behind the verbs.
 
 mod compare;
-mod files;
+pub(crate) mod files;
 mod fitting;
-mod job;
+pub(crate) mod job;
 mod outcome;
 mod playback;
 mod points;

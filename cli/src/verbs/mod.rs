@@ -1,12 +1,15 @@
 //! One file per verb.
 
 pub mod compare;
+pub mod errand;
 pub mod flash;
 pub mod inspect;
 pub mod motion;
 pub mod plan;
+pub mod remote;
 pub mod run;
 pub mod sample;
+pub mod stream;
 pub mod verify;
 
 /// How a verb ended.
@@ -18,6 +21,8 @@ pub enum Verdict {
     Broken,
     /// Done as far as the input allows, and told what it does not.
     Refused,
+    /// Brought to rest because somebody has asked for it.
+    Stopped,
 }
 
 impl Verdict {

@@ -19,6 +19,9 @@ const CHUNK: usize = 1 << 16;
 /// # Errors
 /// The rows cannot be read; then nothing is planned.
 pub fn execute(args: &MoveArgs, console: &mut Console<'_>) -> Result<Verdict, Failure> {
+    if args.bus.is_some() {
+        return super::errand::to(args, console);
+    }
     let job = match &args.file {
         Some(file) => moves::read(file, args.sync.into())?,
         None => moves::single(args)?,

@@ -68,7 +68,7 @@ pub fn deliver(
     match verdict {
         Verdict::Holds => files.feed = show(&set.write(&feed, &outcome.feed)?),
         // The table of an earlier run is not what the new report is about.
-        Verdict::Broken | Verdict::Refused => set.retire(&feed),
+        Verdict::Broken | Verdict::Refused | Verdict::Stopped => set.retire(&feed),
     }
     files.report = show(&set.write("report.html", report::page(&outcome.report).as_bytes())?);
     files.trace = trace.as_deref().and_then(show);

@@ -18,7 +18,7 @@ pub use source::Source;
 use controller::Station;
 use wire::{Ending, Transmission};
 
-use super::{BitTiming, Bus, EVENTS, Frame, Nanoseconds, NodeIndex, Received, Stuffing, Traffic};
+use super::{BitTiming, Bus, Frame, Nanoseconds, NodeIndex, Received, Stuffing, Traffic, keep_event};
 
 /// Frames of a source that may wait; what finds no room is overwritten.
 const MAILBOXES: usize = 8;
@@ -200,10 +200,7 @@ impl CanBus {
             match ending {
                 Ending::Crossed if sends => {
                     node.sending.pop_front();
-                    if node.sent.len() == EVENTS {
-                        node.sent.pop_front();
-                    }
-                    node.sent.push_back(Received { time: end, frame });
+                    keep_event(&mut node.sent, Received { time: end, frame });
                     node.counters.transmitted();
                     node.history.sent += 1;
                 }

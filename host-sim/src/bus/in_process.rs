@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{BitTiming, Bus, EVENTS, Frame, Nanoseconds, NodeIndex, Received, Traffic};
+use super::{BitTiming, Bus, Frame, Nanoseconds, NodeIndex, Received, Traffic, keep_event};
 
 /// A bus that loses nothing and is the same on every run.
 ///
@@ -66,10 +66,7 @@ impl Bus for InProcessBus {
             for (i, node) in self.nodes.iter_mut().enumerate() {
                 if i == sender {
                     node.sending.pop_front();
-                    if node.sent.len() == EVENTS {
-                        node.sent.pop_front();
-                    }
-                    node.sent.push_back(Received { time: end, frame });
+                    keep_event(&mut node.sent, Received { time: end, frame });
                 } else {
                     node.received.push_back(Received { time: end, frame });
                 }
@@ -132,6 +129,18 @@ mod tests {
         bus.advance(140_000);
         assert_eq!(bus.receive(b).map(|r| r.time), Some(140_000));
         assert_eq!(bus.waiting(a), 0);
+    }
+
+    #[test]
+    fn every_frame_that_has_crossed_is_told_to_its_sender() {
+        let mut bus = InProcessBus::new(BitTiming::default());
+        let [a, _] = [bus.attach(), bus.attach()];
+        for id in [9, 3, 7] {
+            bus.send(a, frame(id), 0);
+        }
+        bus.advance(u64::MAX);
+        let told: Vec<_> = core::iter::from_fn(|| bus.sent(a)).map(|r| (r.time, r.frame.id())).collect();
+        assert_eq!(told, [(135_000, 9), (270_000, 3), (405_000, 7)]);
     }
 
     #[test]

@@ -32,6 +32,8 @@ pub(super) enum Command {
     Rate(Change),
     /// To one drive, by its index.
     Power(usize, PowerEvent),
+    /// To one drive, by its index.
+    Tell(usize, HostMessage<'static>),
 }
 
 /// A change of the rate of path time.
@@ -43,7 +45,7 @@ pub(super) struct Change {
     pub(super) repeat_at: u64,
 }
 
-impl HostNode<'_> {
+impl HostNode {
     /// The frames of a command.
     pub(super) fn frames_of(&self, command: Command) -> Vec<Frame> {
         let mut epoch = self.greeting.epoch();
@@ -68,11 +70,12 @@ impl HostNode<'_> {
                 (ids::BROADCAST, HostMessage::Override { permille, tick, number })
             }
             Command::Power(drive, event) => (to(drive), HostMessage::Power(event)),
+            Command::Tell(drive, message) => (to(drive), message),
         };
         frames(id, self.frames, epoch, &message)
     }
 
-    fn frames_of_block(&self, upload: &Upload<'_>, block: Block) -> Vec<Frame> {
+    fn frames_of_block(&self, upload: &Upload, block: Block) -> Vec<Frame> {
         let node = |axis: Option<usize>| {
             axis.and_then(|axis| self.drives.get(axis)).map(|link| link.address).or(Node::new(1))
         };

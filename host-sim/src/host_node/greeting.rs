@@ -112,6 +112,7 @@ impl Greeting {
         &mut self,
         drives: &mut [Link],
         needs: Option<&Packed>,
+        tick_ns: u32,
         tick: u64,
         patience: u64,
     ) -> Result<Vec<Command>, HostError> {
@@ -134,7 +135,8 @@ impl Greeting {
         }
         for (axis, link) in drives.iter().enumerate() {
             let Some(identity) = &link.identity else { continue };
-            if let Some(mismatch) = needs.and_then(|packed| mismatch(identity, packed, axis)) {
+            let table = || needs.and_then(|packed| unfit_for(identity, packed, axis));
+            if let Some(mismatch) = unfit(identity, tick_ns, axis).or_else(table) {
                 return Err(HostError::Mismatch { axis, mismatch });
             }
             if newer(identity.epoch, self.newest) {
@@ -166,8 +168,23 @@ fn newer(a: u16, b: u16) -> bool {
     ahead != 0 && ahead <= u16::MAX / 2
 }
 
+/// In what a drive does not fit at all.
+fn unfit(identity: &Identity, tick_ns: u32, axis: usize) -> Option<Mismatch> {
+    if identity.schema != schema::HASH {
+        Some(Mismatch::Schema { found: identity.schema })
+    } else if identity.format != FORMAT_VERSION {
+        Some(Mismatch::Format { found: identity.format })
+    } else if identity.tick_ns != tick_ns {
+        Some(Mismatch::Tick { found: identity.tick_ns, wanted: tick_ns })
+    } else if usize::from(identity.axis) != axis {
+        Some(Mismatch::Axis { found: identity.axis })
+    } else {
+        None
+    }
+}
+
 /// In what a drive does not fit a table.
-fn mismatch(identity: &Identity, packed: &Packed, axis: usize) -> Option<Mismatch> {
+fn unfit_for(identity: &Identity, packed: &Packed, axis: usize) -> Option<Mismatch> {
     let header = &packed.header;
     let Some(part) = packed.axes.get(axis) else { return Some(Mismatch::Axis { found: identity.axis }) };
     let (asked, has) = (part.header.limits, identity.limits);
@@ -177,15 +194,7 @@ fn mismatch(identity: &Identity, packed: &Packed, axis: usize) -> Option<Mismatc
         (None, Some(_)) => false,
     };
     let needed = header.shared_bytes() + u64::from(part.header.control_bytes);
-    if identity.schema != schema::HASH {
-        Some(Mismatch::Schema { found: identity.schema })
-    } else if identity.format != FORMAT_VERSION {
-        Some(Mismatch::Format { found: identity.format })
-    } else if identity.tick_ns != header.tick_ns {
-        Some(Mismatch::Tick { found: identity.tick_ns, wanted: header.tick_ns })
-    } else if usize::from(identity.axis) != axis {
-        Some(Mismatch::Axis { found: identity.axis })
-    } else if !(asked.velocity <= has.velocity && asked.acceleration <= has.acceleration && jerk) {
+    if !(asked.velocity <= has.velocity && asked.acceleration <= has.acceleration && jerk) {
         Some(Mismatch::Limits)
     } else if needed > u64::from(identity.room) {
         Some(Mismatch::Room { needed, room: identity.room })

@@ -66,7 +66,15 @@ impl Link {
 
     /// It stands still, with nothing to come.
     pub(super) fn has_come_to_rest(&self) -> bool {
-        self.beat.is_some_and(|beat| matches!(beat.state, State::Holding | State::Idle) && beat.fill_ms == 0)
+        use State::{Holding, Idle, Ready, Receiving};
+        let rests =
+            |beat: Beat| matches!(beat.state, Holding | Idle | Ready | Receiving) && beat.fill_ms == 0;
+        self.beat.is_some_and(rests)
+    }
+
+    /// It stands still, on its way or at the end of it.
+    pub(super) fn stands(&self) -> bool {
+        self.has_come_to_rest() || self.beat.is_some_and(|beat| beat.state == State::Held)
     }
 
     /// Somebody stops this drive, or it passes on that somebody has.

@@ -1,11 +1,13 @@
 //! One table on its way to the drives.
 
+use std::sync::Arc;
+
 use planner::feed::pack::Packed;
 use protocol::bus::FrameSize;
 use protocol::bus::data::{UNIT, units};
 use protocol::message::{DriveMessage, Gaps, HostMessage, Part, Reject};
 
-use super::HostError;
+use super::{HostError, Order};
 
 /// One message or data frame of an upload; `axis` is `None` for the shared part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,8 +20,8 @@ pub(super) enum Block {
 
 /// A table with what the drives have said about it.
 #[derive(Clone, Debug)]
-pub(super) struct Upload<'a> {
-    packed: &'a Packed,
+pub(super) struct Upload {
+    order: Arc<Order>,
     /// Units that a frame carries.
     stride: u32,
     drives: Vec<Progress>,
@@ -44,12 +46,12 @@ struct Progress {
     gaps: [Option<Gaps>; 2],
 }
 
-impl<'a> Upload<'a> {
-    pub(super) fn new(packed: &'a Packed, drives: usize, size: FrameSize) -> Self {
+impl Upload {
+    pub(super) fn new(order: Arc<Order>, drives: usize, size: FrameSize) -> Self {
         let drives = vec![Progress::default(); drives];
         let stride = units(size);
         Self {
-            packed,
+            order,
             stride,
             drives,
             anew: false,
@@ -60,17 +62,23 @@ impl<'a> Upload<'a> {
         }
     }
 
-    pub(super) fn packed(&self) -> &'a Packed {
-        self.packed
+    pub(super) fn packed(&self) -> &Packed {
+        &self.order.packed
+    }
+
+    /// Ticks at rest before it.
+    pub(super) fn pause(&self) -> u64 {
+        self.order.pause
     }
 
     pub(super) fn table(&self) -> u32 {
-        self.packed.header.table
+        self.order.packed.header.table
     }
 
     /// Everything that carries the table, in order.
-    pub(super) fn everything(&self) -> impl Iterator<Item = Block> + use<'a> {
-        let (packed, axes, stride) = (self.packed, self.packed.axes.len(), self.stride as usize);
+    pub(super) fn everything(&self) -> impl Iterator<Item = Block> + use<'_> {
+        let (packed, stride) = (self.packed(), self.stride as usize);
+        let axes = packed.axes.len();
         let parts = move || core::iter::once(None).chain((0..axes).map(Some));
         let data = parts().flat_map(move |axis| {
             let units = packed.part(axis).len().div_ceil(UNIT) as u32;
@@ -81,8 +89,8 @@ impl<'a> Upload<'a> {
     }
 
     /// The message of a block, and the axis it goes to; `None` goes to all.
-    pub(super) fn message(&self, block: Block) -> (Option<usize>, HostMessage<'a>) {
-        let packed = self.packed;
+    pub(super) fn message(&self, block: Block) -> (Option<usize>, HostMessage<'static>) {
+        let packed = self.packed();
         match block {
             Block::Open => (None, HostMessage::Open(packed.header)),
             Block::OpenAxis(axis) => (Some(axis), HostMessage::OpenAxis(packed.axes[axis].header)),
@@ -166,7 +174,7 @@ impl<'a> Upload<'a> {
             for (part, to) in [(Part::Shared, None), (Part::Axis, Some(axis))] {
                 let gaps = drive.gaps[part as usize].take();
                 let stride = self.stride as usize;
-                let length = self.packed.part(to).len().div_ceil(UNIT) as u32;
+                let length = self.order.packed.part(to).len().div_ceil(UNIT) as u32;
                 units.extend(gaps.iter().flat_map(Gaps::ranges).flat_map(|gap| {
                     (gap.start..gap.end.min(length)).step_by(stride).map(move |unit| (to, unit))
                 }));

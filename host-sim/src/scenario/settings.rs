@@ -127,8 +127,8 @@ impl SimSettings {
         (self.settle_s / tick_s).ceil() as u64
     }
 
-    /// The host's patience: everybody has said something once, at the given bit rate.
-    pub(super) fn host_timing(&self, tick_s: f64, axes: usize) -> HostTiming {
+    /// The host's patience, for a control tick [s] and so many drives: everybody has said something once, at the given bit rate.
+    pub fn host_timing(&self, tick_s: f64, axes: usize) -> HostTiming {
         let message_s = MESSAGE_FRAMES * FRAME_BITS / f64::from(self.bus.nominal.max(1));
         let ticks = |messages: f64| (messages * message_s / tick_s).ceil() as u64 + 2;
         let round = ticks(axes as f64 + 2.0);

@@ -6,4 +6,5 @@ pub mod job;
 pub mod messages;
 pub mod override_bounds;
 pub mod pack;
+pub mod stream;
 pub mod table;

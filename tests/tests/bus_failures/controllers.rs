@@ -244,13 +244,7 @@ fn a_fourth_drive_has_the_number_of_the_second() {
     let twins = job.cast.drives.clone();
     job.cast.drives.truncate(3);
     let mut bus = host_sim::bus::CanBus::new(BitTiming::default(), host_sim::bus::Stuffing::Exact, 3);
-    let host = host_sim::host_node::HostNode::new(
-        &job.cast.orders,
-        3,
-        FrameSize::Classic,
-        job.cast.timing,
-        &mut bus,
-    );
+    let host = job.host(&mut bus);
     let settings = host_sim::fleet::FleetSettings::default();
     let mut fleet = host_sim::fleet::Fleet::new(&twins, &mut buffers, host, settings, &mut bus);
     let (mut moved, mut error) = ([false; 4], None);

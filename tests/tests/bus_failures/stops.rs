@@ -122,7 +122,7 @@ fn override_to_zero_and_back() {
     scene.pass(60);
     let change = |scene: &mut Scene<'_>, permille: u16| {
         let now = scene.fleet.now();
-        let host = scene.fleet.host().unwrap();
+        let host = scene.fleet.host();
         let tick = host.tick_at(now);
         host.change_rate(permille, tick);
     };
