@@ -6,8 +6,10 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::failure::Failure;
 
+mod bus;
 mod live;
 
+pub use bus::{DriveArgs, WatchArgs};
 pub use live::{BusArgs, HomeArgs, JogArgs, RateArgs, ResumeArgs, StatusArgs, StopArgs, StreamArgs};
 
 /// Fastest motion within a machine's limits, as a table for its drives.
@@ -58,6 +60,10 @@ pub enum Verb {
     Home(HomeArgs),
     /// Build a drive's image, put it where it runs, and ask it who it is
     Flash(FlashArgs),
+    /// Simulated drives on a real bus, in real time
+    Drive(DriveArgs),
+    /// Show what is said on a bus, or was said according to a log
+    Bus(WatchArgs),
 }
 
 /// How much a verb says, and to whom.
@@ -81,6 +87,8 @@ impl Verb {
             Verb::Verify(args) => args.speech.talk(),
             Verb::Inspect(args) => args.speech.talk(),
             Verb::Flash(args) => args.speech.talk(),
+            Verb::Drive(args) => args.speech.talk(),
+            Verb::Bus(args) => args.speech.talk(),
             Verb::Stream(args) => args.speech.talk(),
             Verb::Status(args) => args.speech.talk(),
             Verb::Hold(args) => args.speech.talk(),

@@ -19,12 +19,14 @@ pub struct Console<'a> {
     talk: Talk,
     /// Standard output has refused a text.
     deaf: bool,
+    /// Nobody reads standard output any more.
+    closed: bool,
 }
 
 impl<'a> Console<'a> {
     /// A console on two streams.
     pub fn new(out: &'a mut dyn Write, err: &'a mut dyn Write, talk: Talk) -> Self {
-        Console { out, err, talk, deaf: false }
+        Console { out, err, talk, deaf: false, closed: false }
     }
 
     /// How much to say.
@@ -60,8 +62,17 @@ impl<'a> Console<'a> {
                     "Make room where standard output goes, or send it elsewhere; result files are in place.",
                 ))
             }
-            _ => Ok(()),
+            Err(_) => {
+                self.closed = true;
+                Ok(())
+            }
+            Ok(()) => Ok(()),
         }
+    }
+
+    /// Nobody reads standard output any more: what goes on without end may end.
+    pub fn is_closed(&self) -> bool {
+        self.closed
     }
 
     /// Shows a failure: a diagnostic on standard error, and in JSON mode the error object on standard output.

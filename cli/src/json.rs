@@ -9,11 +9,13 @@ use serde::Serialize;
 
 use crate::failure::{Blame, Failure};
 
+mod bus;
 mod compare;
 mod flash;
 mod live;
 mod motion;
 
+pub use bus::{DecodedJson, DriveAxisJson, DrivesJson, HealthJson, MalformedJson, WatchedJson, seconds};
 pub use compare::{CompareFilesJson, CompareJson, MethodJson, MethodState};
 pub use flash::{DriveLimitsJson, FlashJson};
 pub use live::{AxisAtJson, DriveJson, ErrandJson, StatusJson, StopJson, StreamJson};

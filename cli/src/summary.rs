@@ -1,6 +1,9 @@
 //! What a verb prints for people: one aligned column of names, one of values.
 
+mod bus;
 pub mod live;
+
+pub use bus::{decoded, drives, watched};
 
 use crate::json::{
     BusJson, CertificateJson, CompareJson, DriveLimitsJson, FlashJson, InspectJson, MethodJson, MethodState,

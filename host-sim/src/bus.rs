@@ -6,6 +6,7 @@
 
 mod bits;
 pub mod can;
+pub mod decode;
 mod in_process;
 mod lossy;
 mod meddler;

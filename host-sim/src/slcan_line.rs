@@ -13,6 +13,9 @@ use protocol::message::{DriveMessage, HostMessage, Identity, MessageBuffer, deco
 /// What opens an adapter at 1 Mbit/s: closed first, whatever it was before.
 const OPEN: &[u8] = b"\rC\rS8\rO\r";
 
+/// The same with 5 Mbit/s for the data of CAN FD.
+const OPEN_FD: &[u8] = b"\rC\rS8\rY5\rO\r";
+
 /// How often a question is asked again while nobody answers.
 const AGAIN: Duration = Duration::from_millis(200);
 
@@ -33,9 +36,10 @@ pub enum LineError {
 /// A serial line.
 pub struct SlcanLine {
     input: Box<dyn Write + Send>,
-    output: Receiver<Vec<u8>>,
+    output: Receiver<(Instant, Vec<u8>)>,
     reader: Reader,
-    frames: VecDeque<Frame>,
+    frames: VecDeque<(Instant, Frame)>,
+    malformed: u64,
 }
 
 impl std::fmt::Debug for SlcanLine {
@@ -52,10 +56,16 @@ impl SlcanLine {
             let mut buffer = [0u8; 4096];
             while let Ok(count) = output.read(&mut buffer)
                 && count > 0
-                && to.send(buffer[..count].to_vec()).is_ok()
+                && to.send((Instant::now(), buffer[..count].to_vec())).is_ok()
             {}
         });
-        Self { input: Box::new(input), output: from, reader: Reader::new(), frames: VecDeque::new() }
+        Self {
+            input: Box::new(input),
+            output: from,
+            reader: Reader::new(),
+            frames: VecDeque::new(),
+            malformed: 0,
+        }
     }
 
     /// Opens the adapter at a device file, for 1 Mbit/s.
@@ -63,27 +73,18 @@ impl SlcanLine {
     /// # Errors
     /// There is none, or it is somebody else's.
     pub fn adapter(device: &Path) -> Result<Self, LineError> {
-        let open = || std::fs::OpenOptions::new().read(true).write(true).open(device);
-        let mut line = Self::new(open().map_err(LineError::Open)?, open().map_err(LineError::Open)?);
+        let (output, input) = crate::serial_port::open(device).map_err(LineError::Open)?;
+        let mut line = Self::new(input, output);
         line.write(OPEN)?;
         Ok(line)
     }
 
-    /// Opens what is at a path: an adapter, or a socket of the system with frames behind it.
-    ///
-    /// # Errors
-    /// There is nothing, or it is somebody else's.
-    pub fn at(path: &Path) -> Result<Self, LineError> {
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::FileTypeExt;
-            use std::os::unix::net::UnixStream;
-            if std::fs::metadata(path).is_ok_and(|m| m.file_type().is_socket()) {
-                let stream = UnixStream::connect(path).map_err(LineError::Open)?;
-                return Ok(Self::new(stream.try_clone().map_err(LineError::Open)?, stream));
-            }
+    /// What opens an adapter for frames of a size.
+    pub(crate) fn opening(size: FrameSize) -> &'static [u8] {
+        match size {
+            FrameSize::Classic => OPEN,
+            FrameSize::Fd => OPEN_FD,
         }
-        Self::adapter(path)
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), LineError> {
@@ -105,21 +106,37 @@ impl SlcanLine {
     /// # Errors
     /// The line is broken.
     pub fn receive(&mut self, until: Instant) -> Result<Option<Frame>, LineError> {
+        Ok(self.receive_stamped(until)?.map(|(_, frame)| frame))
+    }
+
+    /// As [`SlcanLine::receive`], with the time at which its last byte was read.
+    ///
+    /// # Errors
+    /// The line is broken.
+    pub fn receive_stamped(&mut self, until: Instant) -> Result<Option<(Instant, Frame)>, LineError> {
         loop {
             if let Some(frame) = self.frames.pop_front() {
                 return Ok(Some(frame));
             }
-            let bytes = match self.output.recv_timeout(until.saturating_duration_since(Instant::now())) {
-                Ok(bytes) => bytes,
-                Err(RecvTimeoutError::Timeout) => return Ok(None),
-                Err(RecvTimeoutError::Disconnected) => return Err(LineError::Broken),
-            };
+            let (read, bytes) =
+                match self.output.recv_timeout(until.saturating_duration_since(Instant::now())) {
+                    Ok(bytes) => bytes,
+                    Err(RecvTimeoutError::Timeout) => return Ok(None),
+                    Err(RecvTimeoutError::Disconnected) => return Err(LineError::Broken),
+                };
             for byte in bytes {
-                if let Some(Line::Frame(frame)) = self.reader.push(byte) {
-                    self.frames.push_back(frame);
+                match self.reader.push(byte) {
+                    Some(Line::Frame(frame)) => self.frames.push_back((read, frame)),
+                    Some(Line::Malformed) => self.malformed += 1,
+                    Some(Line::Empty | Line::Command(_)) | None => {}
                 }
             }
         }
+    }
+
+    /// Lines that were neither a frame nor an answer.
+    pub fn malformed(&self) -> u64 {
+        self.malformed
     }
 
     /// Asks the drive at `node` who it is.

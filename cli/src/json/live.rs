@@ -53,7 +53,7 @@ pub struct StatusJson {
 }
 
 /// How a drive is.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct DriveJson {
     /// Its address.
     pub node: u8,

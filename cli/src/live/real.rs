@@ -1,6 +1,6 @@
 //! Drives on a real bus, in real time.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use host_sim::bus::real::{self, BusError, RealBus};
 use host_sim::host_node::HostNode;
@@ -10,8 +10,10 @@ use super::{Stage, failed, frames, timing};
 use crate::args::BusArgs;
 use crate::failure::Failure;
 
-/// Between two turns of the host.
-const TURN: Duration = Duration::from_millis(1);
+/// Between two turns of the host [ns].
+const TURN_NS: u64 = 1_000_000;
+/// How long the last word may take to go out [ns].
+const FLUSH_NS: u64 = 100_000_000;
 
 /// Opens a bus.
 ///
@@ -30,8 +32,7 @@ pub(crate) fn sound(bus: &mut dyn RealBus) -> Result<(), Failure> {
 }
 
 fn gone(error: &BusError) -> Failure {
-    Failure::input(error.to_string())
-        .with_help("--bus takes sim, a CAN interface that is up (ip link show), or slcan: and a device file.")
+    Failure::input(error.to_string()).with_help(error.help())
 }
 
 /// A host on a real bus.
@@ -39,8 +40,7 @@ pub(crate) struct RealStage<'a> {
     bus: Box<dyn RealBus>,
     host: HostNode,
     header: &'a FileHeader,
-    began: Instant,
-    next: Instant,
+    next: u64,
 }
 
 /// Goes on a bus as the host of a machine's drives.
@@ -51,8 +51,19 @@ pub(crate) fn open<'a>(args: &BusArgs, header: &'a FileHeader) -> Result<RealSta
     let mut bus = bus(args)?;
     let axes = u8::try_from(header.axes.len()).unwrap_or(u8::MAX);
     let host = HostNode::new(axes, frames(args), timing(header, args), &mut *bus);
-    let now = Instant::now();
-    Ok(RealStage { bus, host, header, began: now, next: now })
+    Ok(RealStage { bus, host, header, next: 0 })
+}
+
+impl RealStage<'_> {
+    /// Sees the last word of a host that gives up on its way.
+    fn flush(&mut self) {
+        let end = self.now() + FLUSH_NS;
+        while self.bus.waiting(self.host.node()) > 0 && self.now() < end {
+            std::thread::sleep(Duration::from_nanos(TURN_NS));
+            let now = self.now();
+            self.bus.advance(now);
+        }
+    }
 }
 
 impl Stage for RealStage<'_> {
@@ -61,16 +72,20 @@ impl Stage for RealStage<'_> {
     }
 
     fn step(&mut self) -> Result<(), Failure> {
-        std::thread::sleep(self.next.saturating_duration_since(Instant::now()));
-        self.next = Instant::now() + TURN;
+        std::thread::sleep(Duration::from_nanos(self.next.saturating_sub(self.now())));
         let now = self.now();
+        self.next = now + TURN_NS;
         self.bus.advance(now);
-        self.host.turn(&mut *self.bus, now).map_err(|e| failed(&e, self.header))?;
+        let turn = self.host.turn(&mut *self.bus, now).map_err(|e| failed(&e, self.header));
+        if turn.is_err() {
+            self.flush();
+        }
+        turn?;
         sound(&mut *self.bus)
     }
 
     fn now(&self) -> u64 {
-        u64::try_from(self.began.elapsed().as_nanos()).unwrap_or(u64::MAX)
+        self.bus.now()
     }
 
     fn is_virtual(&self) -> bool {

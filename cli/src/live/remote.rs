@@ -2,7 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use host_sim::bus::{Bus, NodeIndex};
+use host_sim::bus::NodeIndex;
+use host_sim::bus::real::RealBus;
 use planner::feed::messages::frames;
 use protocol::bus::beat::Beat;
 use protocol::bus::stop::Stop;
@@ -31,22 +32,21 @@ pub(crate) struct Found {
 
 /// A listener on a bus.
 pub(crate) struct Remote<'a> {
-    bus: &'a mut dyn Bus,
+    bus: &'a mut dyn RealBus,
     node: NodeIndex,
     frames: FrameSize,
-    began: Instant,
     found: Vec<Found>,
 }
 
 impl<'a> Remote<'a> {
     /// On a bus.
-    pub(crate) fn new(bus: &'a mut dyn Bus, frames: FrameSize) -> Self {
+    pub(crate) fn new(bus: &'a mut dyn RealBus, frames: FrameSize) -> Self {
         let node = bus.attach();
-        Self { bus, node, frames, began: Instant::now(), found: Vec::new() }
+        Self { bus, node, frames, found: Vec::new() }
     }
 
     fn now(&self) -> u64 {
-        self.began.elapsed().as_nanos() as u64
+        self.bus.now()
     }
 
     fn say(&mut self, epoch: u16, message: &HostMessage<'_>) {

@@ -1,6 +1,8 @@
 //! One file per verb.
 
+pub mod bus;
 pub mod compare;
+pub mod drive;
 pub mod errand;
 pub mod flash;
 pub mod inspect;

@@ -348,6 +348,40 @@ fn flash_tells_whether_the_drive_speaks_this_protocol() {
     assert_eq!(say(&GOOD, &["flash", "--board", "emulated", "--line", "/dev/null"]).status, 2);
 }
 
+/// Fields of the verbs that speak to drives, whatever they have to say.
+fn live_fields() -> BTreeSet<String> {
+    use cli::json::{
+        AxisAtJson, DecodedJson, DriveAxisJson, DriveJson, DrivesJson, ErrandJson, HealthJson, MalformedJson,
+        StatusJson, StopJson, StreamJson, WatchedJson,
+    };
+    let value = |object: Result<serde_json::Value, _>| object.unwrap();
+    let health = HealthJson::default();
+    let objects = [
+        value(serde_json::to_value(StreamJson::default())),
+        value(serde_json::to_value(ErrandJson {
+            axes: vec![AxisAtJson { name: "X".into(), position: 1.0 }],
+            seconds: 1.0,
+            stopped: false,
+        })),
+        value(serde_json::to_value(StatusJson { drives: vec![DriveJson::default()] })),
+        value(serde_json::to_value(StopJson { stop: "path".into(), frames_sent: 3 })),
+        value(serde_json::to_value(DrivesJson {
+            drives: vec![DriveAxisJson::default()],
+            bus_health: health,
+            ..DrivesJson::default()
+        })),
+        value(serde_json::to_value(WatchedJson {
+            decoded: vec![DecodedJson::default()],
+            malformed: vec![MalformedJson::default()],
+            bus_health: Some(health),
+            ..WatchedJson::default()
+        })),
+    ];
+    let mut found = BTreeSet::new();
+    objects.iter().for_each(|object| fields(object, &mut found));
+    found
+}
+
 #[test]
 fn the_documentation_explains_every_field_and_no_other() {
     let text = include_str!("../../../docs/json.md");
@@ -367,6 +401,7 @@ fn the_documentation_explains_every_field_and_no_other() {
     let one = ["--p0", "0", "--p1", "1", "--vmax", "1", "--amax", "1", "--jmax", "1"];
     fields(&json(&say(&GOOD, &[&["move", "--json"][..], &one].concat())), &mut found);
     fields(&serde_json::to_value(flashed(schema::HASH)).unwrap(), &mut found);
+    found.extend(live_fields());
     for name in &found {
         assert!(text.contains(&format!("`{name}`")), "docs/json.md does not explain {name}");
     }
