@@ -16,7 +16,7 @@ pub fn open(path: &Path) -> io::Result<Ends> {
     use std::os::unix::net::UnixStream;
 
     use rustix::fs::OFlags;
-    use rustix::termios::{OptionalActions, isatty, tcgetattr, tcsetattr};
+    use rustix::termios::{OptionalActions, QueueSelector, isatty, tcflush, tcgetattr, tcsetattr};
 
     if path.metadata()?.file_type().is_socket() {
         let socket = UnixStream::connect(path)?;
@@ -29,6 +29,8 @@ pub fn open(path: &Path) -> io::Result<Ends> {
         let mut settings = tcgetattr(&line)?;
         settings.make_raw();
         tcsetattr(&line, OptionalActions::Now, &settings)?;
+        // What came before is not meant for whoever opens the line now.
+        tcflush(&line, QueueSelector::IFlush)?;
     }
     Ok((Box::new(line.try_clone()?), Box::new(line)))
 }
