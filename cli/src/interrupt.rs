@@ -55,17 +55,34 @@ impl Pending {
 
 /// From now on Ctrl-C, and the request to end that a system sends, tidy up before this process ends.
 ///
-/// Where a signal is ignored or handled already, as below `nohup`, everything stays as it is.
+/// Where a signal is ignored or handled already, as below `nohup`, that stays as it is, and only the request to end is heard.
 pub fn tidy_up_on_interrupt() {
     // Without a handler the signals end the process as ever; only temporary files may stay.
-    let _ = ctrlc::try_set_handler(|| {
-        // Whoever moves axes brings them to rest; who presses a third time does not want to wait for that.
-        if LIVE.load(Ordering::Relaxed) && PRESSES.fetch_add(1, Ordering::Relaxed) < MOST_PRESSES {
-            return;
-        }
-        // Held until the process is gone, so that nothing new comes up.
-        let mut pending = pending();
-        pending.remove();
-        std::process::exit(EXIT_INTERRUPTED.into());
-    });
+    if ctrlc::try_set_handler(asked).is_err() {
+        listen_to_termination();
+    }
+}
+
+/// Scripts start what they put in the background with Ctrl-C ignored: the request to end is heard even so.
+#[cfg(unix)]
+fn listen_to_termination() {
+    use signal_hook::consts::SIGTERM;
+    use signal_hook::iterator::Signals;
+    if let Ok(mut signals) = Signals::new([SIGTERM]) {
+        std::thread::spawn(move || signals.forever().for_each(|_| asked()));
+    }
+}
+
+#[cfg(not(unix))]
+fn listen_to_termination() {}
+
+fn asked() {
+    // Whoever moves axes brings them to rest; who presses a third time does not want to wait for that.
+    if LIVE.load(Ordering::Relaxed) && PRESSES.fetch_add(1, Ordering::Relaxed) < MOST_PRESSES {
+        return;
+    }
+    // Held until the process is gone, so that nothing new comes up.
+    let mut pending = pending();
+    pending.remove();
+    std::process::exit(EXIT_INTERRUPTED.into());
 }

@@ -484,9 +484,11 @@ fn an_interrupt_leaves_nothing_behind() {
         assert!(Command::new(program).args(words).current_dir(home.path()).status().unwrap().success());
     };
     done("mkfifo", &["pipe.ngc"]);
-    for signal in ["-INT", "-TERM"] {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_feedspline"))
-            .args(["run", "pipe.ngc", "-o", "out/deep"])
+    // Shells start what they put in the background with Ctrl-C ignored.
+    for (trap, signal) in [("", "-INT"), ("", "-TERM"), ("trap '' INT; ", "-TERM")] {
+        let program = env!("CARGO_BIN_EXE_feedspline");
+        let mut child = Command::new("sh")
+            .args(["-c", &format!("{trap}exec '{program}' run pipe.ngc -o out/deep")])
             .current_dir(home.path())
             .stderr(Stdio::null())
             .spawn()
