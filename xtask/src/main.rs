@@ -8,6 +8,7 @@ mod real;
 mod scale;
 mod shell;
 mod tests;
+mod vcan;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -76,6 +77,8 @@ enum Word {
         #[arg(long, default_value_t = 60)]
         seconds: u64,
     },
+    /// Run a session on a genuine CAN bus of Linux, inside an emulated machine
+    Vcan,
     /// Run the release binary over a folder of part programs and print a table
     Real {
         /// The folder; sub-folders are searched, .gz files are unpacked with gzip
@@ -105,6 +108,7 @@ fn main() -> ExitCode {
         Word::RandomPaths { count, seed, from } => random_paths(&root, count, seed, from),
         Word::DoubleS { count, seed } => double_s(&root, count, seed),
         Word::Fuzz { seconds } => fuzz::run(&root, seconds),
+        Word::Vcan => vcan::run(&root),
         Word::Real { dir, machine } => real::table(&root, &dir, machine.as_deref()),
     };
     match result {
