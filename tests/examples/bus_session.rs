@@ -112,7 +112,10 @@ fn judge(results: &Results, job: &Job) {
     for kind in ["beat", "sync", "time", "data", "command", "answer", "stop", "nmt", "boot"] {
         assert!(count(kind) > 0, "{}: no {kind} in the log: {}", results.tag, log["counts"]);
     }
-    assert_eq!((count("broken"), &log["malformed_lines"]), (0, &0.into()), "{}", log["malformed"]);
+    assert_eq!(&log["malformed_lines"], &0, "{}", log["malformed"]);
+    // Messages of several frames of two hosts at once, or of one that was killed in the middle of one.
+    let frames = log["frames"].as_u64().unwrap_or(0);
+    assert!(count("broken") * 2_000 <= frames, "{}", log["counts"]);
     println!(
         "{}: {} pieces, at least {} ms in hand, off the path {:?} counts, {} frames in the log",
         results.tag, whole["pieces"], whole["lowest_fill_ms"], off, log["frames"]

@@ -1,5 +1,6 @@
 //! Streaming: tables go to the drives as they come, until all are played or somebody stops them.
 
+use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, TryRecvError};
 
 use host_sim::host_node::Order;
@@ -13,6 +14,10 @@ use crate::interrupt;
 use crate::json::StreamJson;
 use crate::progress::Progress;
 
+/// Pieces of a motion that are there before it begins, unless it has fewer: about a second of it.
+const HEAD: usize = 4;
+/// Pieces that are kept here at most.
+const MOST_READY: usize = 8;
 /// How long drives may take to come to rest after a stop [ns].
 const STOP_NS: u64 = 20_000_000_000;
 /// Between two looks at the fill levels [ns].
@@ -24,8 +29,64 @@ const FAREWELL_NS: u64 = 100_000_000;
 pub(crate) struct Conductor<'a> {
     pub(crate) header: &'a FileHeader,
     pub(crate) pieces: Receiver<Result<StreamItem, Failure>>,
-    /// A piece that was needed before anything could begin.
-    pub(crate) first: Option<StreamItem>,
+    /// What has come and was not handed to the host yet.
+    pub(crate) ready: VecDeque<StreamItem>,
+    /// Nothing more comes.
+    ended: bool,
+    /// Why, if not because the job has come to its end.
+    failure: Option<Failure>,
+}
+
+impl<'a> Conductor<'a> {
+    /// Plays what comes, after what has come already.
+    pub(crate) fn new(
+        header: &'a FileHeader,
+        pieces: Receiver<Result<StreamItem, Failure>>,
+        ready: VecDeque<StreamItem>,
+    ) -> Self {
+        Self { header, pieces, ready, ended: false, failure: None }
+    }
+
+    /// Takes what has come; in virtual time waits for it.
+    fn gather(&mut self, stage: &dyn Stage) {
+        while !self.ended && self.ready.len() < MOST_READY {
+            let next = if stage.is_virtual() {
+                if !self.ready.is_empty() {
+                    return;
+                }
+                self.pieces.recv().map_err(|_| TryRecvError::Disconnected)
+            } else {
+                self.pieces.try_recv()
+            };
+            match next {
+                Ok(Ok(item)) => self.ready.push_back(item),
+                Ok(Err(failure)) => (self.failure, self.ended) = (Some(failure), true),
+                Err(TryRecvError::Empty) => return,
+                Err(TryRecvError::Disconnected) => self.ended = true,
+            }
+        }
+    }
+
+    /// The next item, if it may go to the drives: motion begins when so much of it is there that the rest cannot come late.
+    fn next(&mut self, stage: &dyn Stage) -> Option<StreamItem> {
+        let begins = self.ready.front().is_some_and(|item| is_piece(item) && !joins(item));
+        if begins && !self.ended && !stage.is_virtual() {
+            let follow = self.ready.iter().skip(1).take_while(|item| joins(item)).count();
+            if follow + 1 < HEAD && follow + 1 == self.ready.len() {
+                return None;
+            }
+        }
+        self.ready.pop_front()
+    }
+}
+
+fn is_piece(item: &StreamItem) -> bool {
+    matches!(item, StreamItem::Piece { .. })
+}
+
+/// It takes over from the piece before it.
+fn joins(item: &StreamItem) -> bool {
+    matches!(item, StreamItem::Piece { packed, .. } if packed.header.joint.is_some())
 }
 
 impl Conductor<'_> {
@@ -39,19 +100,15 @@ impl Conductor<'_> {
         progress: &mut Progress,
     ) -> Result<StreamJson, Failure> {
         let mut told = StreamJson::default();
-        let (mut pause_s, mut failure) = (0.0, None);
+        let mut pause_s = 0.0;
         let (mut open, mut planned_s) = (true, 0.0f64);
         let (mut presses, mut looked, mut lowest) = (0, 0, u16::MAX);
         progress.stage("streaming");
         loop {
             while open && stage.host().is_hungry() {
-                let next = match self.first.take() {
-                    Some(item) => Ok(Ok(item)),
-                    None if stage.is_virtual() => self.pieces.recv().map_err(|_| TryRecvError::Disconnected),
-                    None => self.pieces.try_recv(),
-                };
-                match next {
-                    Ok(Ok(StreamItem::Piece { packed, until_s, .. })) => {
+                self.gather(stage);
+                match self.next(stage) {
+                    Some(StreamItem::Piece { packed, until_s, .. }) => {
                         let tick_s = f64::from(self.header.tick_ns) * 1e-9;
                         let pause = (std::mem::take(&mut pause_s) / tick_s).ceil() as u64;
                         told.pieces += 1;
@@ -61,17 +118,12 @@ impl Conductor<'_> {
                         planned_s = until_s;
                         stage.host().push(Order { packed, pause });
                     }
-                    Ok(Ok(StreamItem::Dwell { seconds })) => pause_s += seconds,
-                    Ok(Err(error)) => {
-                        failure = Some(error);
+                    Some(StreamItem::Dwell { seconds }) => pause_s += seconds,
+                    None if self.ended => {
                         open = false;
                         stage.host().close();
                     }
-                    Err(TryRecvError::Empty) => break,
-                    Err(TryRecvError::Disconnected) => {
-                        open = false;
-                        stage.host().close();
-                    }
+                    None => break,
                 }
             }
             if interrupt::presses() > presses {
@@ -110,7 +162,7 @@ impl Conductor<'_> {
         while stage.now() < now + FAREWELL_NS {
             stage.step()?;
         }
-        match failure {
+        match self.failure {
             Some(failure) => Err(failure),
             None => Ok(told),
         }

@@ -66,6 +66,10 @@ pub(crate) fn failed(error: &HostError, header: &FileHeader) -> Failure {
                 "Bring it there with `feedspline move --bus`, or begin the job where the axes stand.".to_owned(),
             )
         }
+        HostError::Rejected { reason: Reject::Late { .. }, .. } => (
+            "what follows on the path came too late: the axes come to rest at the end of what they have".to_owned(),
+            "Planning or the bus is slower than the motion. Plan it first and stream the .feed file.".to_owned(),
+        ),
         HostError::Rejected { axis, reason, .. } => (
             format!("axis {} refuses what it is told: {reason:?}", name(*axis)),
             "docs/wire-format.md explains every reason.".to_owned(),

@@ -1,5 +1,6 @@
 //! `feedspline stream`: play a job on drives while it is planned.
 
+use std::collections::VecDeque;
 use std::sync::mpsc::sync_channel;
 
 use planner::feed::stream::StreamItem;
@@ -30,23 +31,30 @@ pub fn execute(args: &StreamArgs, console: &mut Console<'_>) -> Result<Verdict, 
         let (job, header, source) = (&args.job, &header, &source);
         scope.spawn(move || source.run(job, header, room, &out));
         // Where the axes have to stand is told by the first table.
-        let mut waits = Vec::new();
-        let first = loop {
+        let mut ready = VecDeque::new();
+        let positions = loop {
             match pieces.recv() {
-                Ok(Ok(piece @ StreamItem::Piece { .. })) => break Some(piece),
-                Ok(Ok(dwell)) => waits.push(dwell),
+                Ok(Ok(item)) => {
+                    let starts = match &item {
+                        StreamItem::Piece { packed, .. } => {
+                            Some(packed.axes.iter().map(|axis| axis.header.start).collect())
+                        }
+                        StreamItem::Dwell { .. } => None,
+                    };
+                    ready.push_back(item);
+                    if let Some(starts) = starts {
+                        break starts;
+                    }
+                }
                 Ok(Err(failure)) => return Err(failure),
-                Err(_) => break None,
+                Err(_) => {
+                    return Err(
+                        Failure::input("there is nothing to play in this job").in_file(&args.job.file)
+                    );
+                }
             }
         };
-        let Some(first) = first else {
-            return Err(Failure::input("there is nothing to play in this job").in_file(&args.job.file));
-        };
-        let StreamItem::Piece { packed, .. } = &first else {
-            return Err(Failure::internal("the first piece is none"));
-        };
-        let positions = packed.axes.iter().map(|axis| axis.header.start).collect();
-        let conductor = Conductor { header, pieces, first: Some(first) };
+        let conductor = Conductor::new(header, pieces, ready);
         if args.bus.bus == SIM {
             let free_jerk = source.free_jerk();
             let set = sim::Set { header, bus: &args.bus, positions, room, free_jerk, travels: false };

@@ -9,11 +9,18 @@ say() {
     echo $? > /out/$name.status
 }
 
-# begin NAME: the job goes on in the background.
+# begin NAME: the job goes on in the background, as process $playing; finish waits for its end.
 begin() {
-    say "$1" stream /part.ngc &
+    job=$tag-$1
+    echo "$job: stream"
+    feedspline stream /part.ngc --bus $bus $fd --json > /out/$job.json 2> /out/$job.err &
     playing=$!
     sleep 4
+}
+
+finish() {
+    wait $playing
+    echo $? > /out/$job.status
 }
 
 session() {
@@ -34,13 +41,13 @@ session() {
     say slower resume --percent 50
     sleep 1
     say faster resume
-    wait $playing
+    finish
     say after-hold status
 
     say home-2 home
     begin killed
-    pkill -KILL -f 'feedspline stream'
-    wait $playing
+    kill -KILL $playing
+    finish
     sleep 1
     say after-kill status
 
@@ -48,7 +55,7 @@ session() {
     begin stopped
     # On the path, from any CAN tool.
     cansend $bus 010#00
-    wait $playing
+    finish
     sleep 1
     say after-stop status
 
@@ -56,17 +63,18 @@ session() {
     begin quick
     # A reset of CANopen's network management, to all.
     cansend $bus 000#8100
-    wait $playing
+    finish
     sleep 1
     say after-quick status
 
     say home-5 home
     begin unplugged
     ip link set $bus down
-    wait $playing
+    finish
     wait $drives
     ip link set $bus up
-    kill $dump
+    # It may have ended with its bus.
+    kill $dump 2> /dev/null
     feedspline bus /out/$tag.log --json > /out/$tag-log.json 2> /out/$tag-log.err
     echo $? > /out/$tag-log.status
 }
