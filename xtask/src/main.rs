@@ -32,7 +32,7 @@ enum Word {
     Fmt,
     /// Clippy on every target, warnings are errors
     Lint,
-    /// Everything that has to pass: format, lints, names in the documentation, all tests
+    /// Everything that has to pass: format, lints, names in the documentation, all tests, the drive's images, a real bus
     Test,
     /// Run the benches; what they measure is in docs/benchmarks.md
     Bench {
@@ -188,5 +188,6 @@ fn test(root: &Path) -> Step {
         ("names", &|| names::check(root)),
         ("tests", &|| tests::run(root)),
         ("firmware", &|| firmware::run(root)),
+        ("real bus", &|| vcan::run(root)),
     ])
 }
