@@ -1,5 +1,7 @@
 //! A simulated drive on the bus: the shipped core, unchanged.
 
+use std::io;
+
 use firmware_core::drive::{Drive, DriveConfig};
 use protocol::message::Status;
 
@@ -8,6 +10,16 @@ use crate::bus::{Bus, Nanoseconds, NodeIndex};
 
 /// Two table buffers of a drive.
 pub type Buffers = [Vec<u8>; 2];
+
+/// Whoever plays a drive's part in a simulation, tick by tick.
+pub trait Player {
+    /// One control tick at `now`: takes what has come, gives the set-point, sends what there is to say. The second value is
+    /// whether the drive stands still.
+    ///
+    /// # Errors
+    /// It is not there any more.
+    fn play(&mut self, bus: &mut dyn Bus, now: Nanoseconds) -> io::Result<(CountSetpoint, bool)>;
+}
 
 /// One drive, attached to a bus.
 #[derive(Debug)]
@@ -57,5 +69,11 @@ impl<'m> DriveNode<'m> {
     /// The drive itself.
     pub fn drive(&self) -> &Drive<'m> {
         &self.drive
+    }
+}
+
+impl Player for DriveNode<'_> {
+    fn play(&mut self, bus: &mut dyn Bus, now: Nanoseconds) -> io::Result<(CountSetpoint, bool)> {
+        Ok(self.tick(bus, now))
     }
 }

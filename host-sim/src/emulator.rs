@@ -9,7 +9,7 @@ use crate::slcan_line::{LineError, SlcanLine};
 pub const PROGRAM: &str = "qemu-system-arm";
 
 /// The board it plays: a Cortex-M4F.
-const BOARD: [&str; 10] = [
+pub const BOARD: [&str; 10] = [
     "-machine",
     "mps2-an386",
     "-display",

@@ -4,6 +4,8 @@ mod settings;
 
 pub use settings::{Loss, Progress, SimError, SimSettings};
 
+use std::io;
+
 use firmware_core::axis::{AxisConfig, Excess};
 use firmware_core::drive::DriveConfig;
 use firmware_core::session::Watch;
@@ -18,7 +20,7 @@ use protocol::table::rules::MAX_FRACTION_BITS;
 
 use crate::axis_loop::CountSetpoint;
 use crate::bus::{Bus, InProcessBus, Lossy, Traffic};
-use crate::drive_node::{Buffers, DriveNode};
+use crate::drive_node::{Buffers, DriveNode, Player};
 use crate::host_node::{HostCounters, HostNode, HostTiming, Order, Run};
 use crate::recording::Recording;
 use crate::report::{BusReport, SimReport};
@@ -131,10 +133,45 @@ pub fn simulate_on(
     let plan = Programme::new(job, machine, settings)?;
     let axes = machine.axes.len();
     let mut buffers: Vec<Buffers> = vec![[vec![0; plan.buffer_bytes], vec![0; plan.buffer_bytes]]; axes];
-    let mut drives = Vec::new();
+    let mut drives: Vec<Box<dyn Player + '_>> = Vec::new();
     for (axis, buffers) in buffers.iter_mut().enumerate() {
-        drives.push(DriveNode::new(plan.drive(axis, settings)?, buffers, bus));
+        drives.push(Box::new(DriveNode::new(plan.drive(axis, settings)?, buffers, bus)));
     }
+    play(bus, &plan, &mut drives, settings, sink, progress)
+}
+
+/// As [`simulate_on`], on drives that somebody else plays: one per axis, which `cast` attaches to the bus.
+///
+/// # Errors
+/// As for [`simulate_on`], or a drive cannot be had, or is gone.
+pub fn simulate_with(
+    bus: &mut dyn Bus,
+    job: &[JobItem],
+    machine: &Machine,
+    settings: &SimSettings,
+    cast: &mut dyn FnMut(&DriveConfig, &mut dyn Bus) -> io::Result<Box<dyn Player>>,
+    sink: &mut dyn TraceSink,
+) -> Result<SimReport, SimError> {
+    let plan = Programme::new(job, machine, settings)?;
+    let mut drives: Vec<Box<dyn Player>> = Vec::new();
+    for (axis, named) in machine.axes.iter().enumerate() {
+        let config = plan.drive(axis, settings)?;
+        let gone = |source| SimError::Gone { axis: named.name.clone(), source };
+        drives.push(cast(&config, bus).map_err(gone)?);
+    }
+    play(bus, &plan, &mut drives, settings, sink, &mut |_| {})
+}
+
+/// A job on drives that are on the bus.
+fn play(
+    bus: &mut dyn Bus,
+    plan: &Programme<'_>,
+    drives: &mut [Box<dyn Player + '_>],
+    settings: &SimSettings,
+    sink: &mut dyn TraceSink,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<SimReport, SimError> {
+    let (machine, axes) = (plan.machine, drives.len());
     let timing = settings.host_timing(plan.tick_s, axes);
     let mut host = HostNode::new(axes as u8, settings.bus.format, timing, bus);
     host.set_tick_ns(plan.tick_ns);
@@ -155,7 +192,8 @@ pub fn simulate_on(
         bus.advance(now);
         host.tick(bus, tick, now)?;
         for (axis, drive) in drives.iter_mut().enumerate() {
-            (next[axis], standing[axis]) = drive.tick(bus, now);
+            let gone = |source| SimError::Gone { axis: machine.axes[axis].name.clone(), source };
+            (next[axis], standing[axis]) = drive.play(bus, now).map_err(gone)?;
         }
         if plan.orders.is_empty() {
             first.get_or_insert(tick);
@@ -186,10 +224,10 @@ pub fn simulate_on(
     progress(Progress { done_s: plan.motion_s, total_s: plan.motion_s });
     sink.end()?;
 
-    let at_end = drives.iter().zip(&next).zip(&standing).zip(&plan.end).all(|(((d, s), still), end)| {
-        let exact = s.position == *end && d.status().position == *end;
-        exact && *still && s.velocity == 0.0 && s.acceleration == 0.0
-    });
+    let at_end =
+        next.iter().zip(&standing).zip(&plan.end).all(|((s, still), end)| {
+            s.position == *end && *still && s.velocity == 0.0 && s.acceleration == 0.0
+        });
     let span = first.zip(end).map_or([0; 2], |(first, end)| [first, end - first]);
     Ok(plan.report(&recording, span, at_end, bus.traffic(), host.counters(), tick))
 }

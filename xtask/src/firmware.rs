@@ -54,7 +54,8 @@ const MOST: [(&str, u64); 17] = [
     ("plan_mean", 6_440),
 ];
 
-/// Builds both images, holds them to their gates, and proves that they compute the same bits as the host.
+/// Builds the images, holds them to their gates, and proves that they compute the same bits as the host; then the host leads
+/// three of them through a job.
 pub(crate) fn run(root: &Path) -> Step {
     if !has_target() {
         skip("firmware", &format!("no {TARGET}: rustup target add {TARGET}"));
@@ -85,7 +86,12 @@ pub(crate) fn run(root: &Path) -> Step {
         skip("emulated drive", &format!("no {QEMU}: apt-get install qemu-system-arm"));
         return Ok(());
     }
-    compare(&host, &emulated(&image("proof"))?)
+    compare(&host, &emulated(&image("proof"))?)?;
+    image::check_instructions(&image("stepped"))?;
+    let stepped = image("stepped").display().to_string();
+    let session =
+        ["run", "--release", "--locked", "--package", "tests", "--example", "emulated_session", "--"];
+    cargo(root, &[&session[..], &[&stepped]].concat())
 }
 
 /// Whether the target is there, or could be fetched.

@@ -1,7 +1,8 @@
-//! What both images need of the board.
+//! What the images need of the board.
 #![no_std]
 
 pub mod stack;
+pub mod steps;
 pub mod uart;
 pub mod workload;
 

@@ -23,6 +23,9 @@ const TRANSMIT_FULL: u32 = 1;
 const RECEIVE_FULL: u32 = 1 << 1;
 /// Bits of `control`.
 const TRANSMIT_AND_RECEIVE: u32 = 3;
+const RECEIVE_INTERRUPT: u32 = 1 << 3;
+/// Bit of `interrupt`.
+const RECEIVE_RAISED: u32 = 1 << 1;
 
 impl Uart {
     /// Switches the port on.
@@ -46,6 +49,20 @@ impl Uart {
             let state = (&raw const (*self.registers).state).read_volatile();
             (state & RECEIVE_FULL != 0).then(|| (&raw const (*self.registers).data).read_volatile() as u8)
         }
+    }
+
+    /// From now on a byte that comes raises the port's interrupt, number 0 of the board: who waits for one may sleep.
+    pub fn raise_on_receive(&mut self) {
+        // SAFETY: the port's registers lie there, and nobody else uses them.
+        unsafe {
+            (&raw mut (*self.registers).control).write_volatile(TRANSMIT_AND_RECEIVE | RECEIVE_INTERRUPT);
+        }
+    }
+
+    /// The interrupt has been heard.
+    pub fn acknowledge(&mut self) {
+        // SAFETY: the port's registers lie there, and nobody else uses them.
+        unsafe { (&raw mut (*self.registers).interrupt).write_volatile(RECEIVE_RAISED) }
     }
 
     /// Sends a byte, and waits until there is room for it.

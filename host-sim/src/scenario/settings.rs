@@ -108,6 +108,14 @@ pub enum SimError {
         /// Control tick since power-up.
         tick: u64,
     },
+    /// A drive that is played elsewhere is not there any more.
+    #[error("the drive of axis {axis} has gone: {source}")]
+    Gone {
+        /// Name of the axis.
+        axis: String,
+        /// What the system says.
+        source: io::Error,
+    },
     /// The trace cannot be written.
     #[error("the trace cannot be written: {0}")]
     Trace(#[from] io::Error),
