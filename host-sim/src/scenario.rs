@@ -140,6 +140,9 @@ pub fn simulate_on(
     play(bus, &plan, &mut drives, settings, sink, progress)
 }
 
+/// Attaches a drive of a configuration to a bus, wherever it is played.
+pub type Casting<'a> = dyn FnMut(&DriveConfig, &mut dyn Bus) -> io::Result<Box<dyn Player>> + 'a;
+
 /// As [`simulate_on`], on drives that somebody else plays: one per axis, which `cast` attaches to the bus.
 ///
 /// # Errors
@@ -149,7 +152,7 @@ pub fn simulate_with(
     job: &[JobItem],
     machine: &Machine,
     settings: &SimSettings,
-    cast: &mut dyn FnMut(&DriveConfig, &mut dyn Bus) -> io::Result<Box<dyn Player>>,
+    cast: &mut Casting<'_>,
     sink: &mut dyn TraceSink,
 ) -> Result<SimReport, SimError> {
     let plan = Programme::new(job, machine, settings)?;
