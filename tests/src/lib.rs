@@ -1,5 +1,6 @@
 //! Oracles, generators and shared pieces of the whole-product suites.
 
+pub mod bandwidth;
 pub mod chain;
 pub mod drives;
 pub mod fleet;

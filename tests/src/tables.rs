@@ -36,6 +36,11 @@ impl Random {
         self.between(from.ln(), to.ln()).exp()
     }
 
+    /// A number from 0 on, below `end`.
+    pub fn below(&mut self, end: u64) -> u64 {
+        self.whole(0, end.saturating_sub(1))
+    }
+
     /// Uniform in from..=to.
     pub fn whole(&mut self, from: u64, to: u64) -> u64 {
         from + self.bits() % (to - from + 1)
