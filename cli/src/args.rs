@@ -330,6 +330,9 @@ pub struct MoveArgs {
     /// Drives send CAN FD
     #[arg(long, requires = "bus")]
     pub fd: bool,
+    /// Key file of drives that obey signed messages only
+    #[arg(long, value_name = "FILE", requires = "bus")]
+    pub key: Option<PathBuf>,
     /// Where drives bring an axis, such as X=12.5; may be given again for others
     #[arg(long, value_name = "AXIS=POSITION", requires = "bus", allow_negative_numbers = true)]
     pub to: Vec<String>,

@@ -1,12 +1,13 @@
 //! A drive on the bus: its halves behind CAN frames.
 
+use protocol::authentic::{Key, needs_tag};
 use protocol::bus::beat::Beat;
 use protocol::bus::data;
 use protocol::bus::emergency::Emergency;
 use protocol::bus::stop::Stop;
 use protocol::bus::sync::{Stamp, Time};
 use protocol::bus::{BLOCK_BYTES, Frame, FrameSize, Node, Reassembler, Segments, ids};
-use protocol::message::{ANSWER_BYTES, DriveMessage, HostMessage, Part, Status, decode, encode};
+use protocol::message::{ANSWER_BYTES, DriveMessage, HostMessage, Part, Reject, Status, decode, encode};
 use protocol::power::PowerEvent;
 
 use crate::axis::AxisConfig;
@@ -32,6 +33,8 @@ pub struct DriveConfig {
     pub axis: AxisConfig,
     /// How it watches over its session.
     pub watch: Watch,
+    /// The key of hosts that may move it; none: everybody may.
+    pub key: Option<Key>,
 }
 
 /// Messages out of frames, and answers into frames.
@@ -41,6 +44,9 @@ struct Mail {
     frames: FrameSize,
     to_all: Reassembler<BLOCK_BYTES>,
     to_this: Reassembler<BLOCK_BYTES>,
+    key: Option<Key>,
+    /// Of the last signed message that was obeyed.
+    counter: u64,
     /// Frames and messages that could not be understood.
     dropped: u32,
     answer: [u8; ANSWER_BYTES],
@@ -57,6 +63,8 @@ impl Mail {
             frames: config.frames,
             to_all: Reassembler::new(),
             to_this: Reassembler::new(),
+            key: config.key,
+            counter: 0,
             dropped: 0,
             answer: [0; ANSWER_BYTES],
             answer_length: 0,
@@ -67,18 +75,23 @@ impl Mail {
 
     /// The message that a frame completes, if any, and its epoch; frames of others are ignored.
     #[inline(never)]
-    fn receive(&mut self, frame: &Frame) -> Option<(u16, HostMessage<'_>)> {
-        let message = if frame.id() == ids::BROADCAST {
-            self.to_all.push(frame.data())
+    fn receive(&mut self, frame: &Frame) -> Option<(u16, Result<HostMessage<'_>, Reject>)> {
+        let (to, message) = if frame.id() == ids::BROADCAST {
+            (0, self.to_all.push(frame.data()))
         } else if frame.id() == self.node.to_drive() {
-            self.to_this.push(frame.data())
+            (self.node.number(), self.to_this.push(frame.data()))
         } else {
             return None;
         };
-        match message.map(|block| block.map(|(epoch, bytes)| (epoch, decode::<HostMessage<'_>>(bytes)))) {
-            Ok(None) => None,
-            Ok(Some((epoch, Ok(message)))) => Some((epoch, message)),
-            Ok(Some((_, Err(_)))) | Err(_) => {
+        let Ok(block) = message else {
+            self.dropped = self.dropped.saturating_add(1);
+            return None;
+        };
+        let (epoch, bytes) = block?;
+        match open(self.key.as_ref(), &mut self.counter, epoch, to, bytes) {
+            Ok(message) => Some((epoch, Ok(message))),
+            Err(Unsealed::Refused) => Some((epoch, Err(Reject::Key))),
+            Err(Unsealed::Worthless) => {
                 self.dropped = self.dropped.saturating_add(1);
                 None
             }
@@ -103,6 +116,43 @@ impl Mail {
     }
 }
 
+/// Why a block holds nothing to obey.
+enum Unsealed {
+    /// It is no message, or one that was obeyed already.
+    Worthless,
+    /// It is not signed with the drive's key.
+    Refused,
+}
+
+/// The message in a block, if the drive may obey it.
+fn open<'b>(
+    key: Option<&Key>,
+    last: &mut u64,
+    epoch: u16,
+    to: u8,
+    bytes: &'b [u8],
+) -> Result<HostMessage<'b>, Unsealed> {
+    let read = |bytes: &'b [u8]| decode::<HostMessage<'_>>(bytes).map_err(|_| Unsealed::Worthless);
+    let message = read(bytes)?;
+    let (HostMessage::Signed { counter, tag, message: signed }, Some(key)) = (message, key) else {
+        return match message {
+            // Whoever has no key cannot tell who has signed.
+            HostMessage::Signed { message, .. } => read(message),
+            other if key.is_some() && needs_tag(&other) => Err(Unsealed::Refused),
+            other => Ok(other),
+        };
+    };
+    if key.tag(epoch, to, counter, signed) != tag {
+        return Err(Unsealed::Refused);
+    }
+    // Doubled and late ones are as good as lost: what matters is repeated.
+    if counter <= *last {
+        return Err(Unsealed::Worthless);
+    }
+    *last = counter;
+    read(signed)
+}
+
 /// The talking half of a drive behind frames: for boards, where [`crate::motion::Motion`] runs in the control interrupt.
 #[derive(Debug)]
 pub struct Station<'a> {
@@ -125,7 +175,7 @@ impl<'a> Station<'a> {
         Self {
             mail: Mail::new(&config),
             session: Session::new(config.node, config.watch, tick_ns),
-            intake: Intake::new(config.axis, a, b),
+            intake: Intake::new(config.axis, a, b).under(config.key),
             tick_ns,
             due: None,
             beat: 0,
@@ -170,6 +220,10 @@ impl<'a> Station<'a> {
     fn message(&mut self, frame: &Frame, at: Stamp, orders: &mut dyn Orders<'a>) {
         let Some((epoch, message)) = self.mail.receive(frame) else { return };
         self.intake.set_session(self.session.boot(), self.session.epoch());
+        let message = match message {
+            Ok(message) => message,
+            Err(reason) => return self.intake.say(DriveMessage::Reject { table: 0, reason }),
+        };
         match self.session.admit(epoch, &message, at) {
             Admission::Pass => self.intake.handle(&message, orders),
             Admission::Done => {}

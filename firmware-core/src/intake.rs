@@ -5,6 +5,7 @@
 //! keeps them. All of this takes its time, and none of it happens in the control tick.
 
 use heapless::Deque;
+use protocol::authentic::Key;
 use protocol::message::{DriveMessage, HostMessage, Identity, Part, Reject, State, Status};
 use protocol::power::PowerEvent;
 use protocol::schema;
@@ -61,6 +62,8 @@ pub struct Intake<'a> {
     change: u8,
     boot: u32,
     epoch: u16,
+    /// What tables are sealed with; none: a checksum.
+    key: Option<Key>,
 }
 
 impl<'a> Intake<'a> {
@@ -76,7 +79,13 @@ impl<'a> Intake<'a> {
             change: 0,
             boot: 0,
             epoch: 0,
+            key: None,
         }
+    }
+
+    /// Tables are sealed with a key.
+    pub fn under(self, key: Option<Key>) -> Self {
+        Self { key, ..self }
     }
 
     /// Takes a message; answers wait in [`Intake::poll_answer`].
@@ -117,8 +126,8 @@ impl<'a> Intake<'a> {
             HostMessage::Power(event) => (0, self.power(event, orders)),
             HostMessage::Alive => (0, order(orders, Order::Alive)),
             HostMessage::Report => (0, order(orders, Order::Report)),
-            // The session has answered it.
-            HostMessage::Begin { .. } => (0, Ok(())),
+            // The session has answered it, or opened what was in it.
+            HostMessage::Begin { .. } | HostMessage::Signed { .. } => (0, Ok(())),
             HostMessage::Identify => {
                 let identity = self.identity();
                 self.answer(DriveMessage::Identity(identity));
@@ -264,7 +273,8 @@ impl<'a> Intake<'a> {
 
     /// Ends a part; a table that has become complete is checked.
     fn seal(&mut self, table: u32, part: Part, crc: u32) -> Result<(), Reject> {
-        match self.incoming(table, |slot| slot.seal(part, crc))? {
+        let key = self.key;
+        match self.incoming(table, |slot| slot.seal(part, crc, key.as_ref()))? {
             Sealed::Half => Ok(()),
             Sealed::Whole => self.check(table),
             Sealed::Missing(gaps) => {

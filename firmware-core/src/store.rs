@@ -2,8 +2,9 @@
 //!
 //! The streams lie at the beginning of the memory, and at its end one bit for each unit of them that has come.
 
+use protocol::authentic::{Key, part_seal};
 use protocol::bus::data::{self, PART_BYTES, UNIT};
-use protocol::message::{Gaps, Part, Reject, part_crc};
+use protocol::message::{Gaps, Part, Reject};
 use protocol::table::warp::RATE_ONE;
 use protocol::table::{AxisHeader, TableHeader};
 
@@ -247,7 +248,7 @@ impl<'a> Slot<'a> {
     }
 
     /// Ends a part.
-    pub(crate) fn seal(&mut self, part: Part, crc: u32) -> Result<Sealed, Reject> {
+    pub(crate) fn seal(&mut self, part: Part, crc: u32, key: Option<&Key>) -> Result<Sealed, Reject> {
         let Some(table) = &mut self.table else { return Err(Reject::NotOpen) };
         let (from, length) = table.place(part).ok_or(Reject::NotOpen)?;
         let progress = *table.progress(part);
@@ -261,8 +262,8 @@ impl<'a> Slot<'a> {
         let memory = self.memory.as_ref().ok_or(Reject::NotOpen)?;
         let bytes = memory.get(from..from + length).ok_or(Reject::NotOpen)?;
         let found = match (part, table.axis) {
-            (Part::Shared, _) => part_crc(&table.header, &[bytes]),
-            (Part::Axis, Some(axis)) => part_crc(&axis, &[bytes]),
+            (Part::Shared, _) => part_seal(key, &table.header, bytes),
+            (Part::Axis, Some(axis)) => part_seal(key, &axis, bytes),
             (Part::Axis, None) => return Err(Reject::NotOpen),
         };
         if found != Ok(crc) {

@@ -11,10 +11,12 @@ mod greeting;
 mod link;
 mod upload;
 
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use planner::feed::pack::Packed;
+use protocol::authentic::Key;
 use protocol::bus::beat::Beat;
 use protocol::bus::stop::Stop;
 use protocol::bus::{Frame, FrameSize, Node};
@@ -185,6 +187,13 @@ pub struct HostNode {
     /// A tick of the drives' count, and when it was told.
     reading: Option<(u64, Nanoseconds)>,
     counters: HostCounters,
+    /// What messages that move or configure anything are signed with.
+    key: Option<Key>,
+    /// Of the last signed message.
+    counter: Cell<u64>,
+    /// At the beginning of time, and now: what counters are made of, so that those of a later host are greater [us].
+    began_us: u64,
+    stamp_us: u64,
 }
 
 #[derive(Debug)]
@@ -226,7 +235,16 @@ impl HostNode {
             refusal: None,
             reading: None,
             counters: HostCounters::default(),
+            key: None,
+            counter: Cell::new(0),
+            began_us: 0,
+            stamp_us: 0,
         }
+    }
+
+    /// Signs with a key from now on. Counters are times since `began_us` at time 0: greater than those of any host before [us].
+    pub fn sign_with(&mut self, key: Key, began_us: u64) {
+        (self.key, self.began_us) = (Some(key), began_us);
     }
 
     /// Another table to play, behind all others.
@@ -276,6 +294,7 @@ impl HostNode {
     /// # Errors
     /// When a drive refuses, fails or is silent for good.
     pub fn tick(&mut self, bus: &mut dyn Bus, tick: u64, now: Nanoseconds) -> Result<(), HostError> {
+        self.stamp_us = self.began_us.saturating_add(now / 1_000);
         let result = self.take_turn(bus, tick);
         if let Err(error) = &result
             && !core::mem::replace(&mut self.stopped, true)
@@ -449,6 +468,9 @@ impl HostNode {
             DriveMessage::Begun { epoch } => {
                 self.greeting.begun(axis, epoch);
                 return Ok(());
+            }
+            DriveMessage::Reject { reason: Reject::Key, .. } => {
+                return Err(HostError::Mismatch { axis, mismatch: Mismatch::Key });
             }
             DriveMessage::Reject { reason, .. } if !self.greeting.is_open() => {
                 self.greeting.refused(&mut self.drives[axis], reason);

@@ -84,6 +84,7 @@ pub fn drive_config(
     Ok(DriveConfig {
         node: address,
         frames: settings.bus.format,
+        key: None,
         watch: Watch { boot: axis as u32 + 1, ..Watch::new(tick_ns, status_ticks) },
         // The planner keeps programs within the travel; paths may leave it by their tolerance.
         axis: AxisConfig {

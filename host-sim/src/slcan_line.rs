@@ -183,7 +183,13 @@ mod tests {
     fn drive(node: Node, mut line: UnixStream) {
         let limits = Limits { velocity: 1e5, acceleration: 1e6, jerk: Some(1e8) };
         let axis = AxisConfig { status_ticks: 1, ..AxisConfig::new(node.number() - 1, 1_000_000, limits) };
-        let config = DriveConfig { node, frames: FrameSize::Classic, axis, watch: Watch::new(1_000_000, 1) };
+        let config = DriveConfig {
+            node,
+            frames: FrameSize::Classic,
+            axis,
+            watch: Watch::new(1_000_000, 1),
+            key: None,
+        };
         let (mut a, mut b) = ([0; 512], [0; 1024]);
         let mut drive = Drive::new(config, &mut a, &mut b);
         let (mut reader, mut byte) = (Reader::new(), [0u8]);

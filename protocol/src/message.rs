@@ -29,7 +29,7 @@ pub enum HostMessage<'a> {
         table: u32,
         /// Which part of it.
         part: Part,
-        /// CRC-32C over the part's header, as postcard, and its bytes.
+        /// [`crate::authentic::part_seal`]: CRC-32C over the part's header, as postcard, and its bytes; under a key another one.
         crc: u32,
     },
     /// The table starts to play at this tick of the drives' common count. A table that joins another one starts where that one
@@ -84,6 +84,15 @@ pub enum HostMessage<'a> {
     },
     /// How is everything? Answered by [`DriveMessage::Status`] in any state.
     Report,
+    /// A message under the key of [`crate::authentic`]: what a drive that has one wants of everything that moves or configures it.
+    Signed {
+        /// Greater than in every message that the drive has obeyed since it is up.
+        counter: u64,
+        /// [`crate::authentic::Key::tag`].
+        tag: u64,
+        /// The message, as postcard.
+        message: &'a [u8],
+    },
     /// Bytes of a table, in any order; repeated ones are harmless. They have frames of their own, see [`crate::bus::data`].
     #[serde(skip)]
     Data {
@@ -335,6 +344,8 @@ pub enum Reject {
     Clock,
     /// The drive is not one of the members, or they are too many.
     Members,
+    /// The drive has a key, and this is not signed with it.
+    Key,
 }
 
 /// Why a message could not be written or read.

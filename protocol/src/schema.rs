@@ -15,7 +15,7 @@ Part[Shared,Axis]\
 HostMessage[Open TableHeader,OpenAxis AxisHeader,\
 Seal{table u32,part Part,crc u32},Start{table u32,tick u64},Stop,Identify,QuickStop,MoveTo{position i64,velocity ?f32},\
 MoveAt{velocity f32},Power PowerEvent,Override{permille u16,tick u64,number u8},Alive,\
-Begin{boot u32,members u128},Report]\
+Begin{boot u32,members u128},Report,Signed{counter u64,tag u64,message [u8]}]\
 DriveMessage[Ready{table u32,ticks u64,crc [u32;2]},Reject{table u32,reason Reject},Status,Identity,Telemetry,\
 Missing{table u32,part Part,gaps [(u32,u32);8]},Begun{epoch u16}]\
 Status{state State,power Power,fault ?Fault,tick u64,position i64,fill u64}\
@@ -27,7 +27,7 @@ Power[SwitchOnDisabled,ReadyToSwitchOn,SwitchedOn,OperationEnabled,QuickStopActi
 PowerEvent[Shutdown,SwitchOn,EnableOperation,DisableOperation,DisableVoltage,QuickStop,ResetFault,Fault,Stopped]\
 Reject[Table TableError,Checksum Part,NoRoom{needed u64,available u64},\
 Tick{tick_ns u32},Axis{axis u8},Limits,Position{position i64},Busy,NotOpen,NotReady,Late{tick u64},\
-Overlap{tick u64},Fault,Target,Power Power,Moves,Override,Joint,Epoch{epoch u16},Boot,Clock,Members]\
+Overlap{tick u64},Fault,Target,Power Power,Moves,Override,Joint,Epoch{epoch u16},Boot,Clock,Members,Key]\
 Stream[Geometry,Spans,Controls]\
 HeaderField[Version,Table,Spans,GeometrySpans,StepExponent,QScale,Tick,Length,FractionBits,Limits,Margin,Warp,Joint,Tail]\
 TableError[Header HeaderField,Truncated{stream,index u32},Malformed{stream,index u32},\

@@ -21,7 +21,7 @@ const LIMITS: Limits = Limits { velocity: 1e9, acceleration: 1e12, jerk: None };
 fn config(axis: usize, position: i64) -> DriveConfig {
     let axis_config = AxisConfig { position, ..AxisConfig::new(axis as u8, TICK_NS, LIMITS) };
     let watch = Watch { host_ticks: 0, ..Watch::new(TICK_NS, 0) };
-    DriveConfig { node: node(axis), frames: FrameSize::Classic, axis: axis_config, watch }
+    DriveConfig { node: node(axis), frames: FrameSize::Classic, axis: axis_config, watch, key: None }
 }
 
 /// A drive under torque.

@@ -35,7 +35,7 @@ fn node() -> Node {
 fn config(position: i64) -> DriveConfig {
     let axis = AxisConfig { position, status_ticks: 10, ..AxisConfig::new(0, TICK_NS, LIMITS) };
     let watch = Watch { host_ticks: 400, ..Watch::new(TICK_NS, 10) };
-    DriveConfig { node: node(), frames: FrameSize::Classic, axis, watch }
+    DriveConfig { node: node(), frames: FrameSize::Classic, axis, watch, key: None }
 }
 
 fn say(epoch: u16, id: u16, message: &HostMessage<'_>) -> Vec<Frame> {

@@ -34,6 +34,9 @@ pub struct DriveArgs {
     /// Send frames of CAN FD
     #[arg(long)]
     pub fd: bool,
+    /// Obey messages only that are signed with the key in this file: 32 hexadecimal digits, or 16 bytes
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
     /// End after so long [s]
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub seconds: Option<f64>,

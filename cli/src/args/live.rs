@@ -15,6 +15,9 @@ pub struct BusArgs {
     /// Send CAN FD instead of classic CAN
     #[arg(long)]
     pub fd: bool,
+    /// Key file of drives that obey signed messages only: 32 hexadecimal digits, or 16 bytes
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
 }
 
 /// `feedspline stream`.

@@ -3,6 +3,7 @@
 
 pub(crate) mod conduct;
 pub(crate) mod errand;
+pub(crate) mod key;
 pub(crate) mod real;
 pub(crate) mod remote;
 pub(crate) mod sim;

@@ -6,7 +6,7 @@ use host_sim::bus::real::{self, BusError, RealBus};
 use host_sim::host_node::HostNode;
 use planner::feed::file::FileHeader;
 
-use super::{Stage, failed, frames, timing};
+use super::{Stage, failed, frames, key, timing};
 use crate::args::BusArgs;
 use crate::failure::Failure;
 
@@ -50,7 +50,10 @@ pub(crate) struct RealStage<'a> {
 pub(crate) fn open<'a>(args: &BusArgs, header: &'a FileHeader) -> Result<RealStage<'a>, Failure> {
     let mut bus = bus(args)?;
     let axes = u8::try_from(header.axes.len()).unwrap_or(u8::MAX);
-    let host = HostNode::new(axes, frames(args), timing(header, args), &mut *bus);
+    let mut host = HostNode::new(axes, frames(args), timing(header, args), &mut *bus);
+    if let Some(key) = key::of(args.key.as_deref())? {
+        host.sign_with(key, key::now_us().saturating_sub(bus.now() / 1_000));
+    }
     Ok(RealStage { bus, host, header, next: 0 })
 }
 

@@ -4,12 +4,14 @@ use std::time::{Duration, Instant};
 
 use host_sim::bus::NodeIndex;
 use host_sim::bus::real::RealBus;
-use planner::feed::messages::frames;
+use planner::feed::messages::signed_frames;
+use protocol::authentic::Key;
 use protocol::bus::beat::Beat;
 use protocol::bus::stop::Stop;
 use protocol::bus::{BLOCK_BYTES, FrameSize, Node, Reassembler, ids};
 use protocol::message::{DriveMessage, HostMessage, Identity, Status, decode};
 
+use super::key::now_us;
 use crate::failure::Failure;
 
 /// How long answers are waited for.
@@ -35,14 +37,15 @@ pub(crate) struct Remote<'a> {
     bus: &'a mut dyn RealBus,
     node: NodeIndex,
     frames: FrameSize,
+    key: Option<Key>,
     found: Vec<Found>,
 }
 
 impl<'a> Remote<'a> {
     /// On a bus.
-    pub(crate) fn new(bus: &'a mut dyn RealBus, frames: FrameSize) -> Self {
+    pub(crate) fn new(bus: &'a mut dyn RealBus, frames: FrameSize, key: Option<Key>) -> Self {
         let node = bus.attach();
-        Self { bus, node, frames, found: Vec::new() }
+        Self { bus, node, frames, key, found: Vec::new() }
     }
 
     fn now(&self) -> u64 {
@@ -51,7 +54,8 @@ impl<'a> Remote<'a> {
 
     fn say(&mut self, epoch: u16, message: &HostMessage<'_>) {
         let now = self.now();
-        for frame in frames(ids::BROADCAST, self.frames, epoch, message) {
+        let counter = now_us();
+        for frame in signed_frames(ids::BROADCAST, self.frames, epoch, message, self.key.as_ref(), counter) {
             self.bus.send(self.node, frame, now);
         }
     }

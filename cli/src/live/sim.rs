@@ -8,7 +8,7 @@ use host_sim::host_node::HostNode;
 use host_sim::scenario::{buffer_for, drive_config};
 use planner::feed::file::FileHeader;
 
-use super::{Stage, failed, settings, timing};
+use super::{Stage, failed, key, settings, timing};
 use crate::args::BusArgs;
 use crate::failure::Failure;
 
@@ -38,9 +38,11 @@ pub(crate) fn with<R>(
     play: impl FnOnce(&mut dyn Stage) -> Result<R, Failure>,
 ) -> Result<R, Failure> {
     let (header, settings) = (set.header, settings(set.bus));
+    let key = key::of(set.bus.key.as_deref())?;
     let config = |axis: usize| {
         let position = set.positions.get(axis).copied().unwrap_or(0);
         let config = drive_config(header, axis, position, set.free_jerk, &settings).map(|mut config| {
+            config.key = key;
             if set.travels {
                 let [low, high] = header.axes[axis].travel.map(|t| t * header.axes[axis].counts_per_unit);
                 config.axis.travel = Some([low.floor() as i64, high.ceil() as i64]);
@@ -55,7 +57,10 @@ pub(crate) fn with<R>(
     let bytes = buffer_for(set.room);
     let mut buffers: Vec<Buffers> = vec![[vec![0; bytes], vec![0; bytes]]; drives.len()];
     let mut bus = InProcessBus::new(settings.bus);
-    let host = HostNode::new(drives.len() as u8, settings.bus.format, timing(header, set.bus), &mut bus);
+    let mut host = HostNode::new(drives.len() as u8, settings.bus.format, timing(header, set.bus), &mut bus);
+    if let Some(key) = key {
+        host.sign_with(key, 0);
+    }
     let crystals = CRYSTALS_PPM.iter().copied().cycle().take(drives.len()).collect();
     let clocks = FleetSettings { crystals_ppm: crystals, ..FleetSettings::default() };
     let fleet = Fleet::new(&drives, &mut buffers, host, clocks, &mut bus);

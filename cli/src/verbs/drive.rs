@@ -19,6 +19,7 @@ use crate::args::DriveArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::json::{DriveAxisJson, DrivesJson, HealthJson, seconds};
+use crate::live::key;
 use crate::local::job::machine_of;
 use crate::{interrupt, summary};
 
@@ -95,9 +96,11 @@ fn configs(
     let settings =
         SimSettings { bus: BitTiming { format, ..BitTiming::default() }, ..SimSettings::default() };
     let header = FileHeader::from(machine);
+    let key = key::of(args.key.as_deref())?;
     let config = |axis| {
         let mut config = drive_config(&header, axis, 0, args.free_jerk, &settings)
             .map_err(|e| Failure::input(e.to_string()).with_help("Choose another machine."))?;
+        config.key = key;
         // Whoever starts up anew is somebody else.
         config.watch.boot = getrandom::u32()
             .map_err(|e| Failure::internal(format!("the system gives no random number: {e}")))?;

@@ -60,7 +60,7 @@ pub fn to(args: &MoveArgs, console: &mut Console<'_>) -> Result<Verdict, Failure
         Ok(Errand::To { axis: axis(&header, name)?, position, velocity: args.velocity })
     });
     let errands = errands.collect::<Result<Vec<_>, Failure>>()?;
-    let bus = BusArgs { bus: args.bus.clone().unwrap_or_default(), fd: args.fd };
+    let bus = BusArgs { bus: args.bus.clone().unwrap_or_default(), fd: args.fd, key: args.key.clone() };
     run(&errands, &header, &bus, console)
 }
 

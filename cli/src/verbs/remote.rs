@@ -9,7 +9,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::json::{DriveJson, StatusJson, StopJson};
 use crate::live::remote::{COPIES, Found, Remote};
-use crate::live::{SIM, frames, real};
+use crate::live::{SIM, frames, key, real};
 use crate::summary;
 
 /// Runs `status`.
@@ -61,8 +61,9 @@ fn on<R>(bus: &BusArgs, act: impl FnOnce(&mut Remote<'_>) -> Result<R, Failure>)
         return Err(Failure::input("simulated drives live only as long as the command that plays on them")
             .with_help("Name the bus with --bus, such as can0, vcan0 or slcan:/dev/ttyACM0."));
     }
+    let key = key::of(bus.key.as_deref())?;
     let mut opened = real::bus(bus)?;
-    let result = act(&mut Remote::new(&mut *opened, frames(bus)));
+    let result = act(&mut Remote::new(&mut *opened, frames(bus), key));
     real::sound(&mut *opened)?;
     result
 }

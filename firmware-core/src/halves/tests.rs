@@ -17,7 +17,7 @@ const LIMITS: Limits = Limits { velocity: 1e6, acceleration: 1e8, jerk: Some(1e1
 fn config() -> DriveConfig {
     let node = Node::new(1).unwrap();
     let watch = Watch { host_ticks: 0, ..Watch::new(1_000_000, 0) };
-    DriveConfig { node, frames: FrameSize::Fd, axis: AxisConfig::new(0, 1_000_000, LIMITS), watch }
+    DriveConfig { node, frames: FrameSize::Fd, axis: AxisConfig::new(0, 1_000_000, LIMITS), watch, key: None }
 }
 
 fn frames(message: &HostMessage<'_>) -> Vec<Frame> {

@@ -74,7 +74,7 @@ impl Reader<'_> {
 
 /// A configuration as bytes; option codes are the usual ones.
 pub fn config_bytes(config: &DriveConfig) -> [u8; CONFIG_BYTES] {
-    let DriveConfig { node, frames, axis, watch } = config;
+    let DriveConfig { node, frames, axis, watch, key: _ } = config;
     let mut to = Writer([0; CONFIG_BYTES], 0);
     to.put(&[node.number(), u8::from(*frames == FrameSize::Fd), axis.axis]);
     to.put(&axis.tick_ns.to_le_bytes());
@@ -120,7 +120,7 @@ pub fn config(bytes: &[u8; CONFIG_BYTES]) -> Option<DriveConfig> {
         status_ticks,
         ..AxisConfig::new(axis, tick_ns, limits)
     };
-    Some(DriveConfig { node, frames, axis, watch })
+    Some(DriveConfig { node, frames, axis, watch, key: None })
 }
 
 /// The head of a frame: when it has crossed, after the tick began [ns], its identifier, the length of its data.

@@ -28,6 +28,7 @@ use firmware_core::evaluate::Setpoint;
 use firmware_core::clock::Reload;
 use firmware_core::halves::{Between, Move};
 use firmware_core::session::Watch;
+use protocol::authentic::Key;
 use protocol::bus::{Frame, FrameSize, Node};
 use protocol::table::Limits;
 
@@ -71,6 +72,13 @@ const CONFIG: DriveConfig = {
             )
         },
         watch: Watch::new(TICK_NS, STATUS_TICKS),
+        key: match option_env!("FEEDSPLINE_KEY") {
+            Some(digits) => match Key::from_hex(digits.as_bytes()) {
+                Some(key) => Some(key),
+                None => panic!("FEEDSPLINE_KEY is a key of 32 hexadecimal digits"),
+            },
+            None => None,
+        },
     }
 };
 

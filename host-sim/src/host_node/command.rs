@@ -1,6 +1,6 @@
 //! What the host has to say, and the frames of it.
 
-use planner::feed::messages::frames;
+use planner::feed::messages::signed_frames;
 use protocol::bus::stop::Stop;
 use protocol::bus::{Frame, Node, ids};
 use protocol::message::HostMessage;
@@ -72,7 +72,14 @@ impl HostNode {
             Command::Power(drive, event) => (to(drive), HostMessage::Power(event)),
             Command::Tell(drive, message) => (to(drive), message),
         };
-        frames(id, self.frames, epoch, &message)
+        self.sign(id, epoch, &message)
+    }
+
+    /// The frames of a message, under the key if there is one.
+    fn sign(&self, id: u16, epoch: u16, message: &HostMessage<'_>) -> Vec<Frame> {
+        let counter = self.stamp_us.max(self.counter.get() + 1);
+        self.counter.set(counter);
+        signed_frames(id, self.frames, epoch, message, self.key.as_ref(), counter)
     }
 
     fn frames_of_block(&self, upload: &Upload, block: Block) -> Vec<Frame> {
@@ -83,10 +90,13 @@ impl HostNode {
             let frame = node(axis).and_then(|to| upload.packed().data_frame(axis, to, self.frames, unit));
             return frame.into_iter().collect();
         }
-        let (axis, message) = upload.message(block);
+        let (axis, message) = match (block, &self.key) {
+            (Block::Seal(axis), Some(key)) => (axis, upload.packed().seal_under(axis, key)),
+            _ => upload.message(block),
+        };
         let id = axis.and_then(node_of(&self.drives)).unwrap_or(ids::BROADCAST);
         let epoch = self.greeting.epoch();
-        frames(id, self.frames, epoch, &message)
+        self.sign(id, epoch, &message)
     }
 }
 

@@ -49,6 +49,9 @@ pub enum Mismatch {
         /// What the drive has [bytes].
         room: u32,
     },
+    /// It has a key, and the host has none or another one.
+    #[error("it has a key, and this host does not sign with it")]
+    Key,
     /// It is busy with another host.
     #[error("another host has it in use, or it still moves")]
     InUse,

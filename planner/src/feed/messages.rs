@@ -1,5 +1,6 @@
 //! The frames that carry a packed table to the drives.
 
+use protocol::authentic::{Key, needs_tag, part_seal};
 use protocol::bus::{Frame, FrameSize, Node, Segments, data, ids};
 use protocol::message::{HostMessage, MessageBuffer, Part, encode};
 
@@ -35,6 +36,20 @@ impl Packed {
         HostMessage::Seal { table: self.header.table, part, crc }
     }
 
+    /// The seal of a part under a key.
+    ///
+    /// # Panics
+    /// There is no such axis.
+    pub fn seal_under(&self, axis: Option<usize>, key: &Key) -> HostMessage<'static> {
+        let bytes = self.part(axis);
+        let (part, crc) = match axis {
+            None => (Part::Shared, part_seal(Some(key), &self.header, bytes)),
+            Some(axis) => (Part::Axis, part_seal(Some(key), &self.axes[axis].header, bytes)),
+        };
+        // Headers always fit their buffer.
+        HostMessage::Seal { table: self.header.table, part, crc: crc.unwrap_or(0) }
+    }
+
     /// All frames that bring the drive `to` of an axis its table, inside an epoch.
     ///
     /// # Panics
@@ -51,6 +66,24 @@ impl Packed {
         }
         all
     }
+}
+
+/// The frames of a message that is signed with a key, where a drive that has one wants that; the counter grows from one to the
+/// next.
+pub fn signed_frames(
+    id: u16,
+    size: FrameSize,
+    epoch: u16,
+    message: &HostMessage<'_>,
+    key: Option<&Key>,
+    counter: u64,
+) -> Vec<Frame> {
+    let Some(key) = key.filter(|_| needs_tag(message)) else { return frames(id, size, epoch, message) };
+    let to = id.checked_sub(ids::BROADCAST).and_then(|node| u8::try_from(node).ok()).unwrap_or(0);
+    let mut buffer: MessageBuffer = [0; _];
+    let Ok(bytes) = encode(message, &mut buffer) else { return Vec::new() };
+    let tag = key.tag(epoch, to, counter, bytes);
+    frames(id, size, epoch, &HostMessage::Signed { counter, tag, message: bytes })
 }
 
 /// The frames of a message to the drives that listen to `id`, in order.

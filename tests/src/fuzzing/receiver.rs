@@ -152,7 +152,7 @@ pub fn lives(bytes: &[u8]) -> bool {
     let axis =
         AxisConfig { position, status_ticks: 8, ..AxisConfig::new(0, TICK_NS, packed.axes[0].header.limits) };
     let watch = Watch { boot: 7, host_ticks: 150, ..Watch::new(TICK_NS, 8) };
-    let config = DriveConfig { node: node(), frames: FrameSize::Classic, axis, watch };
+    let config = DriveConfig { node: node(), frames: FrameSize::Classic, axis, watch, key: None };
     let mut witness = Witness {
         drive: Drive::new(config, &mut a, &mut b),
         incoming: [Reassembler::new(), Reassembler::new()],

@@ -14,6 +14,7 @@ use firmware_core::axis::AxisConfig;
 use firmware_core::drive::DriveConfig;
 use firmware_core::halves::{Between, Move};
 use firmware_core::session::Watch;
+use protocol::authentic::Key;
 use protocol::bus::slcan::{self, LINE_BYTES, Line, Reader};
 use protocol::bus::{FrameSize, Node};
 use protocol::table::Limits;
@@ -47,6 +48,13 @@ const CONFIG: DriveConfig = {
             ..AxisConfig::new(NODE - 1, TICK_NS, Limits { velocity: 1e9, acceleration: 1e11, jerk: None })
         },
         watch: Watch::new(TICK_NS, STATUS_TICKS),
+        key: match option_env!("FEEDSPLINE_KEY") {
+            Some(digits) => match Key::from_hex(digits.as_bytes()) {
+                Some(key) => Some(key),
+                None => panic!("FEEDSPLINE_KEY is a key of 32 hexadecimal digits"),
+            },
+            None => None,
+        },
     }
 };
 

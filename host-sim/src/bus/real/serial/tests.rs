@@ -109,7 +109,8 @@ fn a_drive_behind_a_pseudo_terminal_says_who_it_is() {
     let node = Node::new(5).unwrap();
     let limits = Limits { velocity: 1e5, acceleration: 1e6, jerk: Some(1e8) };
     let axis = AxisConfig { status_ticks: 5, ..AxisConfig::new(4, 1_000_000, limits) };
-    let config = DriveConfig { node, frames: FrameSize::Classic, axis, watch: Watch::new(1_000_000, 5) };
+    let config =
+        DriveConfig { node, frames: FrameSize::Classic, axis, watch: Watch::new(1_000_000, 5), key: None };
     let mut buffers = [vec![0; 512], vec![0; 512]];
     let mut drive = DriveNode::new(config, &mut buffers, drives.as_mut());
     let to_drives = host.attach();
