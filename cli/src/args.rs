@@ -9,7 +9,7 @@ use crate::failure::Failure;
 mod bus;
 mod live;
 
-pub use bus::{DriveArgs, WatchArgs};
+pub use bus::{DriveArgs, UpdateArgs, WatchArgs};
 pub use live::{BusArgs, HomeArgs, JogArgs, RateArgs, ResumeArgs, StatusArgs, StopArgs, StreamArgs};
 
 /// Fastest motion within a machine's limits, as a table for its drives.
@@ -60,6 +60,8 @@ pub enum Verb {
     Home(HomeArgs),
     /// Build a drive's image, put it where it runs, and ask it who it is
     Flash(FlashArgs),
+    /// Bring a drive a new image over the bus
+    Update(UpdateArgs),
     /// Simulated drives on a real bus, in real time
     Drive(DriveArgs),
     /// Show what is said on a bus, or was said according to a log
@@ -87,6 +89,7 @@ impl Verb {
             Verb::Verify(args) => args.speech.talk(),
             Verb::Inspect(args) => args.speech.talk(),
             Verb::Flash(args) => args.speech.talk(),
+            Verb::Update(args) => args.speech.talk(),
             Verb::Drive(args) => args.speech.talk(),
             Verb::Bus(args) => args.speech.talk(),
             Verb::Stream(args) => args.speech.talk(),

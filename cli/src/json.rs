@@ -15,7 +15,9 @@ mod flash;
 mod live;
 mod motion;
 
-pub use bus::{DecodedJson, DriveAxisJson, DrivesJson, HealthJson, MalformedJson, WatchedJson, seconds};
+pub use bus::{
+    DecodedJson, DriveAxisJson, DrivesJson, HealthJson, MalformedJson, UpdateJson, WatchedJson, seconds,
+};
 pub use compare::{CompareFilesJson, CompareJson, MethodJson, MethodState};
 pub use flash::{DriveLimitsJson, FlashJson};
 pub use live::{AxisAtJson, DriveJson, ErrandJson, StatusJson, StopJson, StreamJson};

@@ -68,6 +68,7 @@ pub fn status(
         Verb::Jog(args) => verbs::errand::jog(args, &mut console),
         Verb::Home(args) => verbs::errand::home(args, &mut console),
         Verb::Flash(args) => verbs::flash::execute(args, &mut console),
+        Verb::Update(args) => verbs::update::execute(args, &mut console),
         Verb::Drive(args) => verbs::drive::execute(args, &mut console),
         Verb::Bus(args) => verbs::bus::execute(args, &mut console),
         Verb::Sample(args) => verbs::sample::execute(args, &mut console),

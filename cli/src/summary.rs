@@ -3,7 +3,7 @@
 mod bus;
 pub mod live;
 
-pub use bus::{decoded, drives, watched};
+pub use bus::{decoded, drives, updated, watched};
 
 use crate::json::{
     BusJson, CertificateJson, CompareJson, DriveLimitsJson, FlashJson, InspectJson, MethodJson, MethodState,

@@ -7,8 +7,10 @@ use protocol::bus::emergency::Emergency;
 use protocol::bus::stop::Stop;
 use protocol::bus::sync::{Stamp, Time};
 use protocol::bus::{BLOCK_BYTES, Frame, FrameSize, Node, Reassembler, Segments, ids};
-use protocol::message::{ANSWER_BYTES, DriveMessage, HostMessage, Part, Reject, Status, decode, encode};
-use protocol::power::PowerEvent;
+use protocol::message::{
+    ANSWER_BYTES, DriveMessage, HostMessage, Part, Reject, State, Status, decode, encode,
+};
+use protocol::power::{Power, PowerEvent};
 
 use crate::axis::AxisConfig;
 use crate::clock::Clock;
@@ -18,6 +20,7 @@ use crate::motion::{Link, Motion};
 use crate::orders::{Order, Report};
 use crate::player::Queues;
 use crate::session::{Admission, Demand, Held, Session, Watch};
+use crate::update::{ImageStore, Next, Updater};
 
 /// A status goes out at every change, and with every so many beats.
 const STATUS_BEATS: u32 = 10;
@@ -159,6 +162,7 @@ pub struct Station<'a> {
     mail: Mail,
     session: Session,
     intake: Intake<'a>,
+    update: Updater<'a>,
     tick_ns: u32,
     /// The beat that waits to be sent.
     due: Option<Frame>,
@@ -176,12 +180,23 @@ impl<'a> Station<'a> {
             mail: Mail::new(&config),
             session: Session::new(config.node, config.watch, tick_ns),
             intake: Intake::new(config.axis, a, b).under(config.key),
+            update: Updater::new(None),
             tick_ns,
             due: None,
             beat: 0,
             shown: None,
             booted: false,
         }
+    }
+
+    /// With a place for new images.
+    pub fn with_images(self, store: &'a mut dyn ImageStore) -> Self {
+        Self { update: Updater::new(Some(store)), ..self }
+    }
+
+    /// The drive has to start up anew, with another image.
+    pub fn wants_restart(&self) -> bool {
+        self.update.wants_restart()
     }
 
     /// Takes a frame from the bus that has ended at `at`.
@@ -225,8 +240,18 @@ impl<'a> Station<'a> {
             Err(reason) => return self.intake.say(DriveMessage::Reject { table: 0, reason }),
         };
         match self.session.admit(epoch, &message, at) {
-            Admission::Pass => self.intake.handle(&message, orders),
-            Admission::Done => {}
+            Admission::Pass => {
+                if let HostMessage::Update(step) = message {
+                    match self.update.handle(step, self.session.is_open()) {
+                        Next::Say(answer) => self.intake.say(answer),
+                        Next::Ask => self.intake.handle(&HostMessage::Report, orders),
+                    }
+                } else {
+                    self.intake.handle(&message, orders);
+                }
+            }
+            // Whoever wants motion has no use for a new image.
+            Admission::Done => self.update.forget(),
             Admission::Refuse(reason) => self.intake.say(DriveMessage::Reject { table: 0, reason }),
         }
     }
@@ -275,7 +300,14 @@ impl<'a> Station<'a> {
                     self.session.shifted(ticks);
                 }
             }
-            other => self.intake.hear(other),
+            other => {
+                if let Report::Reported(status) = &other
+                    && let Some(answer) = self.update.status(is_off(status))
+                {
+                    self.intake.say(answer);
+                }
+                self.intake.hear(other);
+            }
         }
     }
 
@@ -327,6 +359,9 @@ impl<'a> Station<'a> {
         if let Some(frame) = self.session.poll_transmit(now.tick) {
             return Some(frame);
         }
+        if let Some(answer) = self.update.work() {
+            self.intake.say(answer);
+        }
         if let Some(frame) = self.due.take() {
             return Some(frame);
         }
@@ -354,6 +389,12 @@ impl<'a> Station<'a> {
     }
 }
 
+/// At rest, and no torque anywhere near.
+fn is_off(status: &Status) -> bool {
+    matches!(status.power, Power::SwitchOnDisabled | Power::ReadyToSwitchOn | Power::Fault)
+        && !matches!(status.state, State::Armed | State::Running | State::Stopping | State::Moving)
+}
+
 /// The boot-up message of CANopen. Its heartbeats are not sent: at the lowest priority of all they would hold up the beats behind
 /// them for as long as table data keep the bus busy.
 const BOOTED: u8 = 0x00;
@@ -374,6 +415,16 @@ impl<'a> Drive<'a> {
             motion: Motion::new(config.axis),
             queues: Queues::default(),
         }
+    }
+
+    /// With a place for new images.
+    pub fn with_images(self, store: &'a mut dyn ImageStore) -> Self {
+        Self { station: self.station.with_images(store), ..self }
+    }
+
+    /// The drive has to start up anew, with another image, once there is nothing more to transmit.
+    pub fn wants_restart(&self) -> bool {
+        self.station.wants_restart()
     }
 
     /// Takes a frame from the bus that has ended so long after the present tick began [ns]; frames of others are ignored.

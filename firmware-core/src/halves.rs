@@ -13,6 +13,7 @@ use crate::evaluate::Setpoint;
 use crate::intake::Orders;
 use crate::motion::{Link, Motion};
 use crate::orders::{ORDERS, Order, REPORTS, Report};
+use crate::update::ImageStore;
 
 /// What lies between the halves; it outlives them.
 #[derive(Debug, Default)]
@@ -99,7 +100,17 @@ impl<'a> Link<'a> for Ends<'_, 'a> {
     }
 }
 
-impl Talk<'_, '_> {
+impl<'a> Talk<'_, 'a> {
+    /// With a place for new images.
+    pub fn with_images(self, store: &'a mut dyn ImageStore) -> Self {
+        Self { station: self.station.with_images(store), ..self }
+    }
+
+    /// The drive has to start up anew, with another image, once there is nothing more to transmit.
+    pub fn wants_restart(&self) -> bool {
+        self.station.wants_restart()
+    }
+
     /// Takes a frame from the bus that has ended so long after the present tick began [ns]; frames of others are ignored.
     pub fn receive(&mut self, frame: &Frame, ns: u32) {
         let at = self.hear(ns);

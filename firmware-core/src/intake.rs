@@ -126,8 +126,8 @@ impl<'a> Intake<'a> {
             HostMessage::Power(event) => (0, self.power(event, orders)),
             HostMessage::Alive => (0, order(orders, Order::Alive)),
             HostMessage::Report => (0, order(orders, Order::Report)),
-            // The session has answered it, or opened what was in it.
-            HostMessage::Begin { .. } | HostMessage::Signed { .. } => (0, Ok(())),
+            // Somebody else has answered it, or opened what was in it.
+            HostMessage::Begin { .. } | HostMessage::Signed { .. } | HostMessage::Update(_) => (0, Ok(())),
             HostMessage::Identify => {
                 let identity = self.identity();
                 self.answer(DriveMessage::Identity(identity));

@@ -14,6 +14,7 @@
 #![no_std]
 
 pub mod axis;
+pub mod boot;
 pub mod clock;
 mod course;
 pub mod double_s;
@@ -35,3 +36,4 @@ mod store;
 pub mod table;
 mod telemetry;
 pub mod time;
+pub mod update;

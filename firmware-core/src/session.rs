@@ -173,7 +173,7 @@ impl Session {
     #[inline(never)]
     pub(crate) fn admit(&mut self, epoch: u16, message: &HostMessage<'_>, now: Stamp) -> Admission {
         match *message {
-            HostMessage::Identify | HostMessage::Report => Admission::Pass,
+            HostMessage::Identify | HostMessage::Report | HostMessage::Update(_) => Admission::Pass,
             // To stop is always allowed, and ends the epoch.
             HostMessage::Stop
             | HostMessage::QuickStop

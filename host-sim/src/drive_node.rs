@@ -3,6 +3,7 @@
 use std::io;
 
 use firmware_core::drive::{Drive, DriveConfig};
+use firmware_core::update::ImageStore;
 use protocol::message::Status;
 
 use crate::axis_loop::CountSetpoint;
@@ -35,6 +36,22 @@ impl<'m> DriveNode<'m> {
     pub fn new(config: DriveConfig, buffers: &'m mut Buffers, bus: &mut dyn Bus) -> Self {
         let [a, b] = buffers;
         Self { drive: Drive::new(config, a, b), node: bus.attach(), began: 0 }
+    }
+
+    /// With a place for new images.
+    pub fn with_images(self, store: &'m mut dyn ImageStore) -> Self {
+        Self { drive: self.drive.with_images(store), ..self }
+    }
+
+    /// The drive starts up anew, in the place of the one before it on the bus.
+    pub fn restart(&mut self, config: DriveConfig, buffers: &'m mut Buffers, store: &'m mut dyn ImageStore) {
+        let [a, b] = buffers;
+        self.drive = Drive::new(config, a, b).with_images(store);
+    }
+
+    /// Everything that it has to say has left it.
+    pub fn has_said_all(&self, bus: &dyn Bus) -> bool {
+        bus.waiting(self.node) == 0
     }
 
     /// One control tick at `now`: takes what has come, gives the set-point, sends what there is to say.

@@ -11,12 +11,18 @@ use protocol::message::Status;
 use crate::bus::Nanoseconds;
 use crate::bus::real::{BusError, RealBus};
 use crate::drive_node::{Buffers, DriveNode};
+use crate::flash_memory::{FlashMemory, SharedFlash};
+
+/// Place for an image [bytes].
+const IMAGE_BYTES: usize = 1 << 20;
 
 /// One drive.
 #[derive(Debug)]
 struct Member<'m> {
-    address: Node,
+    config: DriveConfig,
     drive: DriveNode<'m>,
+    memory: SharedFlash,
+    buffer_bytes: usize,
     tick_ns: f64,
     /// When its next tick is due [ns].
     next: f64,
@@ -71,13 +77,20 @@ impl<'m> Live<'m> {
     /// Drives with their buffers, which start up now.
     pub fn new(configs: &[DriveConfig], buffers: &'m mut [Buffers], bus: &mut dyn RealBus) -> Self {
         let now = bus.now() as f64;
-        let members = configs.iter().zip(buffers).map(|(config, buffers)| Member {
-            address: config.node,
-            drive: DriveNode::new(*config, buffers, bus),
-            tick_ns: f64::from(config.axis.tick_ns),
-            next: now,
-            ticks: 0,
-            shown: None,
+        let members = configs.iter().zip(buffers).map(|(config, buffers)| {
+            let memory = SharedFlash::new(FlashMemory::new(IMAGE_BYTES, b"simulated"));
+            let _ = memory.start(None);
+            let store: &'static mut SharedFlash = Box::leak(Box::new(memory.clone()));
+            Member {
+                config: *config,
+                buffer_bytes: buffers[0].len(),
+                drive: DriveNode::new(*config, buffers, bus).with_images(store),
+                memory,
+                tick_ns: f64::from(config.axis.tick_ns),
+                next: now,
+                ticks: 0,
+                shown: None,
+            }
         });
         Self { members: members.collect(), late: 0, worst: 0 }
     }
@@ -106,6 +119,9 @@ impl<'m> Live<'m> {
         self.late += u64::from(lateness as f64 > member.tick_ns);
         member.drive.tick(bus, time);
         member.ticks += 1;
+        if member.drive.drive().wants_restart() && member.drive.has_said_all(bus) {
+            member.restart();
+        }
         let trim = f64::from(member.drive.drive().trim_ppb()) * 1e-9;
         member.next += member.tick_ns * (1.0 - trim);
         let condition = member.condition();
@@ -118,7 +134,7 @@ impl<'m> Live<'m> {
 
     /// The drives' addresses, and how they are.
     pub fn conditions(&self) -> impl Iterator<Item = (Node, Condition)> + '_ {
-        self.members.iter().map(|member| (member.address, member.condition()))
+        self.members.iter().map(|member| (member.config.node, member.condition()))
     }
 
     /// Ticks that were computed later than the next one was due, and by how much any was late at most.
@@ -128,6 +144,18 @@ impl<'m> Live<'m> {
 }
 
 impl Member<'_> {
+    /// Starts up, with the image that its memory says. Memory of the drive before is not given back: such starts are few.
+    fn restart(&mut self) {
+        let _ = self.memory.start(None);
+        let buffers: &'static mut Buffers =
+            Box::leak(Box::new([vec![0; self.buffer_bytes], vec![0; self.buffer_bytes]]));
+        let store: &'static mut SharedFlash = Box::leak(Box::new(self.memory.clone()));
+        self.config.axis.position = self.drive.status().position;
+        self.config.watch.boot = self.config.watch.boot.wrapping_add(1);
+        self.drive.restart(self.config, buffers, store);
+        self.ticks = 0;
+    }
+
     fn condition(&self) -> Condition {
         let drive = self.drive.drive();
         let (epoch, open) = drive.epoch();

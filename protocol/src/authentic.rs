@@ -14,6 +14,7 @@ use siphasher::sip::SipHasher24;
 
 use crate::message::{HEADER_BYTES, HostMessage, MessageError, encode, part_crc};
 use crate::power::PowerEvent;
+use crate::update::Update;
 
 /// Bytes of a key.
 pub const KEY_BYTES: usize = 16;
@@ -102,6 +103,7 @@ pub fn needs_tag(message: &HostMessage<'_>) -> bool {
         | HostMessage::Power(PowerEvent::QuickStop | PowerEvent::DisableVoltage)
         | HostMessage::Alive
         | HostMessage::Report
+        | HostMessage::Update(Update::Ask)
         | HostMessage::Data { .. } => false,
         HostMessage::Open(_)
         | HostMessage::OpenAxis(_)
@@ -112,6 +114,7 @@ pub fn needs_tag(message: &HostMessage<'_>) -> bool {
         | HostMessage::Power(_)
         | HostMessage::Override { .. }
         | HostMessage::Begin { .. }
+        | HostMessage::Update(_)
         | HostMessage::Signed { .. } => true,
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! [`table`] is the feed table on the wire: headers, the bounded streams behind them and the rules every table
 //! obeys. [`message`] is what host and drives say to each other; [`bus`] cuts it into CAN frames and puts it
-//! together again; [`authentic`] has the key that a drive may ask for. [`power`] has the states in which they follow. [`schema`] names the version of all of it. Everything works on borrowed bytes, without
+//! together again; [`authentic`] has the key that a drive may ask for. [`update`] brings a drive a new image. [`power`] has the states in which they follow. [`schema`] names the version of all of it. Everything works on borrowed bytes, without
 //! allocation, and answers every input with a value or a named error.
 #![no_std]
 
@@ -13,4 +13,5 @@ pub mod message;
 pub mod power;
 pub mod schema;
 pub mod table;
+pub mod update;
 pub mod varint;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::bus::MESSAGE_BYTES;
 use crate::power::{Power, PowerEvent};
 use crate::table::{AxisHeader, AxisLimit, Limits, TableError, TableHeader};
+use crate::update::{Progress, Update, UpdateFault};
 
 /// Longest message of a drive.
 pub const ANSWER_BYTES: usize = 80;
@@ -93,6 +94,8 @@ pub enum HostMessage<'a> {
         /// The message, as postcard.
         message: &'a [u8],
     },
+    /// A new image for the drive, while its power stage is off. Answered by [`DriveMessage::Update`].
+    Update(#[serde(borrow)] Update<'a>),
     /// Bytes of a table, in any order; repeated ones are harmless. They have frames of their own, see [`crate::bus::data`].
     #[serde(skip)]
     Data {
@@ -155,6 +158,8 @@ pub enum DriveMessage {
         /// The epoch.
         epoch: u16,
     },
+    /// How far the drive is with a new image.
+    Update(Progress),
 }
 
 /// Gaps that are told at once.
@@ -346,6 +351,8 @@ pub enum Reject {
     Members,
     /// The drive has a key, and this is not signed with it.
     Key,
+    /// Not while things are so, or not this image.
+    Update(UpdateFault),
 }
 
 /// Why a message could not be written or read.

@@ -15,9 +15,11 @@ Part[Shared,Axis]\
 HostMessage[Open TableHeader,OpenAxis AxisHeader,\
 Seal{table u32,part Part,crc u32},Start{table u32,tick u64},Stop,Identify,QuickStop,MoveTo{position i64,velocity ?f32},\
 MoveAt{velocity f32},Power PowerEvent,Override{permille u16,tick u64,number u8},Alive,\
-Begin{boot u32,members u128},Report,Signed{counter u64,tag u64,message [u8]}]\
+Begin{boot u32,members u128},Report,Signed{counter u64,tag u64,message [u8]},Update Update]\
+Update[Ask,Begin{bytes u32,hash [u8;32]},Data{offset u32,bytes [u8]},Try,Keep]\
 DriveMessage[Ready{table u32,ticks u64,crc [u32;2]},Reject{table u32,reason Reject},Status,Identity,Telemetry,\
-Missing{table u32,part Part,gaps [(u32,u32);8]},Begun{epoch u16}]\
+Missing{table u32,part Part,gaps [(u32,u32);8]},Begun{epoch u16},Update Progress]\
+Progress[None,Receiving{next u32},Verifying{read u32},Verified,Restarting,Trial]\
 Status{state State,power Power,fault ?Fault,tick u64,position i64,fill u64}\
 Identity{version [u8;3],format u8,schema u64,axis u8,tick_ns u32,limits Limits,room u32,boot u32,epoch u16}\
 Telemetry{ticks u32,following_max u32,following_rms f32,fill_ms u32,worst_tick u32}\
@@ -27,7 +29,8 @@ Power[SwitchOnDisabled,ReadyToSwitchOn,SwitchedOn,OperationEnabled,QuickStopActi
 PowerEvent[Shutdown,SwitchOn,EnableOperation,DisableOperation,DisableVoltage,QuickStop,ResetFault,Fault,Stopped]\
 Reject[Table TableError,Checksum Part,NoRoom{needed u64,available u64},\
 Tick{tick_ns u32},Axis{axis u8},Limits,Position{position i64},Busy,NotOpen,NotReady,Late{tick u64},\
-Overlap{tick u64},Fault,Target,Power Power,Moves,Override,Joint,Epoch{epoch u16},Boot,Clock,Members,Key]\
+Overlap{tick u64},Fault,Target,Power Power,Moves,Override,Joint,Epoch{epoch u16},Boot,Clock,Members,Key,Update UpdateFault]\
+UpdateFault[Unable,Powered,Size{room u32},Hash,Memory,Order]\
 Stream[Geometry,Spans,Controls]\
 HeaderField[Version,Table,Spans,GeometrySpans,StepExponent,QScale,Tick,Length,FractionBits,Limits,Margin,Warp,Joint,Tail]\
 TableError[Header HeaderField,Truncated{stream,index u32},Malformed{stream,index u32},\

@@ -45,6 +45,36 @@ pub struct DriveArgs {
     pub speech: Speech,
 }
 
+/// `feedspline update`.
+#[derive(Args, Clone, Debug)]
+#[command(after_help = "\
+The drive has to be at rest without torque (`feedspline stop --off`), and no host may have it in use. The image is checked as it
+was stored, tried once, and kept when the drive is there again; if it is not, the image before it runs. A break is no matter: the
+same command goes on where it was.
+
+Example: feedspline update --bus can0 --node 2 drive.bin
+         rust-objcopy -O binary drive drive.bin          makes such a file")]
+pub struct UpdateArgs {
+    /// The image, byte by byte as it lies in the drive's memory
+    #[arg(value_name = "IMAGE")]
+    pub image: PathBuf,
+    /// The bus
+    #[arg(long, value_name = "BUS")]
+    pub bus: String,
+    /// Address of the drive
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=127))]
+    pub node: u8,
+    /// Send frames of CAN FD
+    #[arg(long)]
+    pub fd: bool,
+    /// Key file of a drive that obeys signed messages only
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+    /// What to say.
+    #[command(flatten)]
+    pub speech: Speech,
+}
+
 /// `feedspline bus`.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\

@@ -27,6 +27,21 @@ pub struct DrivesJson {
     pub bus_health: HealthJson,
 }
 
+/// The object of `update`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct UpdateJson {
+    /// The image as named on the command line.
+    pub image: String,
+    /// Its length [bytes].
+    pub image_bytes: u32,
+    /// SHA-256 over it, hexadecimal.
+    pub sha256: String,
+    /// Address of the drive.
+    pub node: u8,
+    /// How long it took [s].
+    pub seconds: f64,
+}
+
 /// One drive at the end.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct DriveAxisJson {

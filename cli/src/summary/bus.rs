@@ -1,7 +1,7 @@
 //! The summaries of `drive` and `bus`.
 
 use super::{Sheet, bytes, count, duration, printable};
-use crate::json::{DecodedJson, DrivesJson, HealthJson, WatchedJson};
+use crate::json::{DecodedJson, DrivesJson, HealthJson, UpdateJson, WatchedJson};
 
 /// The summary of `drive`.
 pub fn drives(d: &DrivesJson) -> String {
@@ -26,6 +26,14 @@ pub fn drives(d: &DrivesJson) -> String {
     let late = count(d.late_ticks);
     s.row("late ticks", &format!("{late}, by {} at most", duration(d.worst_lateness_s)));
     health(&mut s, &d.bus_health);
+    s.text
+}
+
+/// The summary of `update`.
+pub fn updated(u: &UpdateJson) -> String {
+    let mut s = Sheet::new(&format!("node {} runs {}", u.node, u.image));
+    s.row("image", &format!("{} in {}", bytes(u64::from(u.image_bytes)), duration(u.seconds)));
+    s.row("sha256", &u.sha256);
     s.text
 }
 

@@ -12,6 +12,7 @@ pub mod remote;
 pub mod run;
 pub mod sample;
 pub mod stream;
+pub mod update;
 pub mod verify;
 
 /// How a verb ended.

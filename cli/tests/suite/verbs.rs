@@ -352,7 +352,7 @@ fn flash_tells_whether_the_drive_speaks_this_protocol() {
 fn live_fields() -> BTreeSet<String> {
     use cli::json::{
         AxisAtJson, DecodedJson, DriveAxisJson, DriveJson, DrivesJson, ErrandJson, HealthJson, MalformedJson,
-        StatusJson, StopJson, StreamJson, WatchedJson,
+        StatusJson, StopJson, StreamJson, UpdateJson, WatchedJson,
     };
     let value = |object: Result<serde_json::Value, _>| object.unwrap();
     let health = HealthJson::default();
@@ -364,6 +364,7 @@ fn live_fields() -> BTreeSet<String> {
             stopped: false,
         })),
         value(serde_json::to_value(StatusJson { drives: vec![DriveJson::default()] })),
+        value(serde_json::to_value(UpdateJson::default())),
         value(serde_json::to_value(StopJson { stop: "path".into(), frames_sent: 3 })),
         value(serde_json::to_value(DrivesJson {
             drives: vec![DriveAxisJson::default()],

@@ -1,6 +1,7 @@
 //! What the images need of the board.
 #![no_std]
 
+pub mod images;
 pub mod stack;
 pub mod steps;
 pub mod uart;

@@ -23,9 +23,9 @@ use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSourc
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, bind_interrupts, can};
 use firmware_core::axis::AxisConfig;
+use firmware_core::clock::Reload;
 use firmware_core::drive::DriveConfig;
 use firmware_core::evaluate::Setpoint;
-use firmware_core::clock::Reload;
 use firmware_core::halves::{Between, Move};
 use firmware_core::session::Watch;
 use protocol::authentic::Key;

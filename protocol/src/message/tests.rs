@@ -2,6 +2,7 @@ use super::*;
 use crate::bus::{BLOCK_BYTES, FrameSize, Reassembler, Segments};
 use crate::schema;
 use crate::table::{AxisLimit, HeaderField, Joint, Limits, Stream, Warp};
+use crate::update::Update;
 use proptest::prelude::*;
 
 extern crate std;
@@ -44,7 +45,11 @@ const AXIS: AxisHeader = AxisHeader {
 #[test]
 fn host_messages_are_pinned() {
     let seal = HostMessage::Seal { table: 1, part: Part::Shared, crc: 0x80 };
-    let cases: [(HostMessage<'_>, &[u8]); 17] = [
+    let cases: [(HostMessage<'_>, &[u8]); 21] = [
+        (HostMessage::Update(Update::Ask), &[15, 0]),
+        (HostMessage::Update(Update::Data { offset: 300, bytes: &[7, 8] }), &[15, 2, 0xac, 2, 2, 7, 8]),
+        (HostMessage::Update(Update::Try), &[15, 3]),
+        (HostMessage::Update(Update::Keep), &[15, 4]),
         (HostMessage::Signed { counter: 300, tag: 5, message: &[4, 9] }, &[14, 0xac, 2, 5, 2, 4, 9]),
         (
             HostMessage::Open(HEADER),
@@ -166,7 +171,7 @@ fn drive_messages_are_pinned() {
 
 #[test]
 fn the_schema_is_pinned() {
-    assert_eq!(schema::HASH, 0xdc08_4e3d_290d_4ca6, "{:#018x}", schema::HASH);
+    assert_eq!(schema::HASH, 0xe80e_ab70_f8aa_4183, "{:#018x}", schema::HASH);
 }
 
 #[test]

@@ -9,6 +9,7 @@ use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::{entry, exception};
 use critical_section::Mutex;
 use emulated::CLOCK_HZ;
+use emulated::images::Images;
 use emulated::uart::Uart;
 use firmware_core::axis::AxisConfig;
 use firmware_core::drive::DriveConfig;
@@ -66,11 +67,15 @@ fn main() -> ! {
     static mut A: [u8; ROOM] = [0; ROOM];
     static mut B: [u8; ROOM] = [0; ROOM];
     static mut BETWEEN: Between<'static> = Between::new();
+    static mut IMAGES: Option<Images> = None;
     static mut PLACE: Option<Move<'static, 'static>> = None;
     let mut config = CONFIG;
     // SAFETY: nobody else names it, and any bits are a number.
     config.watch.boot = unsafe { next_boot(&raw mut BOOT) };
-    let (mut talk, moves) = BETWEEN.drive(config, A, B);
+    // SAFETY: the only ones.
+    let images = IMAGES.insert(unsafe { Images::start() });
+    let (talk, moves) = BETWEEN.drive(config, A, B);
+    let mut talk = talk.with_images(images);
     critical_section::with(|cs| MOVES.borrow(cs).set(Some(PLACE.insert(moves))));
     if let Some(core) = cortex_m::Peripherals::take() {
         let mut timer = core.SYST;
@@ -97,6 +102,8 @@ fn main() -> ! {
         if let Some(frame) = talk.poll_transmit() {
             slcan::line(&frame, &mut text).iter().for_each(|byte| uart.write(*byte));
             talk.sent(&frame, phase_ns());
+        } else if talk.wants_restart() {
+            cortex_m::peripheral::SCB::sys_reset();
         }
     }
 }
